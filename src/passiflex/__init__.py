@@ -1,0 +1,57 @@
+"""Passive Cartesian impedance control of flexible-joint robots, with its energy accounted for.
+
+    import passiflex as pf
+
+    run = pf.simulate(pf.shipped_scenario("fig1"))
+    print(pf.audit(run).verdict)
+
+The rooms, in the order in which they may import each other: `robots`, `phs`, `control`, `native`,
+`simulation`, `passivity`, `studies`, `cli`; `plotting` draws what these produce.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from passiflex.control import ImpedanceLaw as ImpedanceLaw
+    from passiflex.control import RigidImpedanceLaw as RigidImpedanceLaw
+    from passiflex.passivity import Audit as Audit
+    from passiflex.passivity import audit as audit
+    from passiflex.phs import PortHamiltonianSystem as PortHamiltonianSystem
+    from passiflex.robots import FlexibleJointRobot as FlexibleJointRobot
+    from passiflex.robots import catalogue as catalogue
+    from passiflex.simulation import Run as Run
+    from passiflex.simulation import Scenario as Scenario
+    from passiflex.simulation import load_scenario as load_scenario
+    from passiflex.simulation import simulate as simulate
+    from passiflex.studies import shipped_scenario as shipped_scenario
+
+_ROOMS = {
+    "Audit": "passivity",
+    "FlexibleJointRobot": "robots",
+    "ImpedanceLaw": "control",
+    "PortHamiltonianSystem": "phs",
+    "RigidImpedanceLaw": "control",
+    "Run": "simulation",
+    "Scenario": "simulation",
+    "audit": "passivity",
+    "catalogue": "robots",
+    "load_scenario": "simulation",
+    "shipped_scenario": "studies",
+    "simulate": "simulation",
+}
+
+
+def __getattr__(name: str) -> object:
+    """Import a name from its room when it is first used: `import passiflex` itself stays quick."""
+    if name not in _ROOMS:
+        raise AttributeError(f"module 'passiflex' has no attribute {name!r}")
+    value = getattr(import_module(f"passiflex.{_ROOMS[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted([*globals(), *_ROOMS])

@@ -1,0 +1,86 @@
+"""The exception tree: every message says *what* is wrong, what was *got*, what is *needed*, what to *try*."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+
+class PassiflexError(Exception):
+    """Base of all errors that a wrong use of the package raises.
+
+    Parameters
+    ----------
+    what: What is wrong, in one clause.
+    got: The offending value, as evidence.
+    needs: What would have been right.
+    try_: What the caller can do next.
+    """
+
+    def __init__(self, what: str, *, got: object = None, needs: str | None = None, try_: str | None = None):
+        self.what, self.got, self.needs, self.try_ = what, got, needs, try_
+        parts = [what]
+        if got is not None:
+            parts.append(f"got {got}")
+        if needs:
+            parts.append(f"needs {needs}")
+        if try_:
+            parts.append(f"try {try_}")
+        super().__init__("; ".join(parts))
+
+
+class RobotError(PassiflexError):
+    """A robot description cannot be used: URDF, catalogue entry, or its numbers."""
+
+
+class SizeError(PassiflexError):
+    """A value has the wrong shape."""
+
+
+class ValueRangeError(PassiflexError):
+    """A value is outside its range, not finite, or a matrix lacks a required definiteness."""
+
+
+class NameUnknownError(PassiflexError):
+    """A name is not known; the message lists the nearest ones."""
+
+    def __init__(self, kind: str, got: str, known: Iterable[str]):
+        names = sorted(known)
+        near = nearest(got, names)
+        super().__init__(
+            f"unknown {kind}",
+            got=repr(got),
+            needs=f"one of {', '.join(names)}",
+            try_=" or ".join(repr(n) for n in near) if near else None,
+        )
+
+
+class CompilerError(PassiflexError):
+    """Generated C could not be compiled or loaded."""
+
+
+class ScenarioError(PassiflexError):
+    """A scenario file has mistakes; `mistakes` holds one line for each."""
+
+    def __init__(self, source: str, mistakes: list[str]):
+        self.mistakes = mistakes
+        super().__init__(
+            f"{source}: {len(mistakes)} mistake{'s' * (len(mistakes) != 1)}\n  " + "\n  ".join(mistakes)
+        )
+
+
+class SimulationError(PassiflexError):
+    """A run cannot be started, or left the finite numbers."""
+
+
+class RunFileError(PassiflexError):
+    """A file is not a complete run of this package."""
+
+
+class PassiflexWarning(UserWarning):
+    """Something works, but not as well as it could; the message says what to do."""
+
+
+def nearest(name: str, known: Iterable[str]) -> list[str]:
+    """Return up to three known names that are close to `name`, best first."""
+    return difflib.get_close_matches(name, list(known), n=3, cutoff=0.5)

@@ -1,0 +1,131 @@
+"""Named slices of one flat vector: how states, inputs and parameters cross into compiled code.
+
+A compiled function takes flat vectors; people think in names, shapes and units. A `Layout` is the
+one place where the two meet: it makes the symbols, packs numbers, and unpacks results.
+Matrices are stored row by row.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from math import prod
+from types import SimpleNamespace
+from typing import Any, NamedTuple
+
+import casadi as cs
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from passiflex.errors import NameUnknownError, SizeError, ValueRangeError
+
+
+class Field(NamedTuple):
+    """One named entry of a layout."""
+
+    name: str
+    shape: tuple[int, ...]
+    unit: str
+    meaning: str = ""
+
+    @property
+    def size(self) -> int:
+        """Return the number of scalars."""
+        return prod(self.shape)
+
+
+@dataclass(frozen=True)
+class Layout:
+    """An ordered set of fields in one flat vector."""
+
+    fields: tuple[Field, ...]
+
+    def __iter__(self) -> Iterator[Field]:
+        return iter(self.fields)
+
+    def __add__(self, other: Layout) -> Layout:
+        return Layout(self.fields + other.fields)
+
+    def prefixed(self, prefix: str) -> Layout:
+        """Return the same layout with every name preceded by `prefix`."""
+        return Layout(tuple(f._replace(name=prefix + f.name) for f in self.fields))
+
+    @cached_property
+    def slices(self) -> dict[str, slice]:
+        """Return name → slice of the flat vector."""
+        out, start = {}, 0
+        for f in self.fields:
+            out[f.name] = slice(start, start + f.size)
+            start += f.size
+        return out
+
+    @property
+    def size(self) -> int:
+        """Return the length of the flat vector."""
+        return sum(f.size for f in self.fields)
+
+    def symbols(self, name: str) -> tuple[cs.SX, SimpleNamespace]:
+        """Return a fresh symbolic vector and its named views."""
+        vector = cs.SX.sym(name, self.size)
+        return vector, self.view(vector)
+
+    def view(self, vector: cs.SX) -> SimpleNamespace:
+        """Return named symbolic views of `vector`, matrices in shape."""
+        out = {}
+        for f in self.fields:
+            part = vector[self.slices[f.name]]
+            out[f.name] = cs.reshape(part, f.shape[1], f.shape[0]).T if len(f.shape) == 2 else part
+        return SimpleNamespace(**out)
+
+    def stack(self, values: Mapping[str, Any]) -> cs.SX:
+        """Return the flat symbolic vector of named expressions."""
+        parts = []
+        for f in self.fields:
+            part = cs.vec(cs.densify(cs.SX(values[f.name])).T)
+            if part.numel() != f.size:
+                raise SizeError(f"{f.name!r} has the wrong size", got=part.numel(), needs=f"shape {f.shape}")
+            parts.append(part)
+        return cs.vertcat(*parts)
+
+    def pack(self, values: Mapping[str, ArrayLike]) -> NDArray[np.float64]:
+        """Return the flat vector of named numbers.
+
+        Raises
+        ------
+        NameUnknownError, SizeError, ValueRangeError
+            For a name that is missing or not in the layout, a wrong shape, a number that is not finite.
+        """
+        names = [f.name for f in self.fields]
+        for name in values:
+            if name not in self.slices:
+                raise NameUnknownError("parameter", name, names)
+        out = np.empty(self.size)
+        for f in self.fields:
+            if f.name not in values:
+                raise SizeError(f"parameter {f.name!r} is missing", needs=f"shape {f.shape} in {f.unit}")
+            try:
+                value = np.asarray(values[f.name], dtype=float)
+            except (TypeError, ValueError) as error:
+                raise ValueRangeError(
+                    f"parameter {f.name!r} is not a number",
+                    got=repr(values[f.name]),
+                    needs=f"numbers in {f.unit}",
+                ) from error
+            if value.shape != f.shape:
+                raise SizeError(
+                    f"parameter {f.name!r} has the wrong shape",
+                    got=value.shape,
+                    needs=f"{f.shape} in {f.unit}",
+                )
+            if not np.isfinite(value).all():
+                raise ValueRangeError(
+                    f"parameter {f.name!r} is not finite", got=value, needs=f"finite numbers in {f.unit}"
+                )
+            out[self.slices[f.name]] = value.ravel()
+        return out
+
+    def unpack(self, vector: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
+        """Return named views of the last axis of `vector`, each in its shape."""
+        lead = vector.shape[:-1]
+        return {f.name: vector[..., self.slices[f.name]].reshape((*lead, *f.shape)) for f in self.fields}
