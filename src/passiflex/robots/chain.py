@@ -1,0 +1,207 @@
+"""The kinematic and inertial description of a fixed-base serial arm.
+
+Pure numbers in SI units. What is rigidly attached to a moving link is lumped into it; the names of the
+source document stay here.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from passiflex.errors import NameUnknownError, RobotError
+from passiflex.robots.bodies import (
+    HERE,
+    ROUND_OFF,
+    Array,
+    Body,
+    Pose,
+    check_body,
+    lumped,
+    matrix,
+    rotation_of,
+    rpy_of,
+    turned,
+)
+from passiflex.robots.urdf import COMPONENTS, LIMITS, UNLIMITED, Edge, Joint, read_document
+
+
+@dataclass(frozen=True, eq=False)
+class SerialChain:
+    """A serial arm on a fixed base: one body per joint, and the end-effector frame in the last moving link.
+
+    Raises
+    ------
+    RobotError
+        If joints and bodies differ in number, or a mass or an inertia is not positive (definite).
+    """
+
+    name: str
+    joints: tuple[Joint, ...]
+    bodies: tuple[Body, ...]
+    tip_xyz: Array
+    tip_rotation: Array
+
+    def __post_init__(self) -> None:
+        if not self.joints or len(self.joints) != len(self.bodies):
+            got = f"{len(self.joints)} joints and {len(self.bodies)} bodies"
+            raise RobotError("a chain has one body per joint", got=got, needs="at least one of each")
+        for joint, body in zip(self.joints, self.bodies, strict=True):
+            check_body(f"the link moved by joint {joint.name!r}", body, whole=True)
+
+    @property
+    def n(self) -> int:
+        """Return the number of joints."""
+        return len(self.joints)
+
+    @classmethod
+    def from_urdf(cls, text_or_path: str | Path, end_effector: str | None = None) -> SerialChain:
+        """Return the chain of a URDF document.
+
+        Parameters
+        ----------
+        text_or_path: The document itself (any string with a `<`), or the path of its file.
+        end_effector: A link that is fixed to the last moving link; None takes the last link of the chain.
+
+        Raises
+        ------
+        RobotError
+            If the document is not a fixed-base serial arm with complete, physical numbers.
+        NameUnknownError
+            If `end_effector` is not a link of the document.
+        """
+        name, base, children, inertials = read_document(text_or_path)
+        last, (poses, leaving) = base, _rigid_part(base, children)
+        joints, bodies = [], []
+        while leaving:
+            if len(leaving) > 1:
+                raise RobotError(
+                    "the robot is not serial: moving joints branch",
+                    got=", ".join(repr(e.joint.name) for e in leaving),
+                    needs="one moving joint after another",
+                    try_="making the joints of all branches but one fixed (the fingers of a gripper)",
+                )
+            last = leaving[0].child
+            joints.append(_seen_from(poses[leaving[0].parent], leaving[0].joint))
+            poses, leaving = _rigid_part(last, children)
+            bodies.append(_lump(last, poses, inertials))
+        if not joints:
+            raise RobotError("the robot has no moving joint", needs="revolute, continuous or prismatic ones")
+        tip = poses[_end_effector(end_effector, last, poses, children)]
+        return cls(name, tuple(joints), tuple(bodies), tip.xyz, tip.rotation)
+
+    def to_urdf(self) -> str:
+        """Return a canonical URDF document.
+
+        Links are `base`, `link_1`, ... and `tip`, joints `joint_1`, ...; no limit is written as ±1e9.
+        """
+        out = ['<robot name="arm">', '<link name="base"/>']
+        parent = "base"
+        for i, (joint, body) in enumerate(zip(self.joints, self.bodies, strict=True), start=1):
+            child = f"link_{i}"
+            limits = {key: np.clip(getattr(joint, key), -UNLIMITED, UNLIMITED) for key in LIMITS}
+            out += [
+                f'<link name="{child}">',
+                f"  <inertial>{_tag('origin', xyz=body.com, rpy=np.zeros(3))}{_tag('mass', value=body.mass)}",
+                f"    {_tag('inertia', **dict(zip(COMPONENTS, body.inertia, strict=True)))}</inertial>",
+                "</link>",
+                f'<joint name="joint_{i}" type="{joint.kind}">',
+                f'  <parent link="{parent}"/><child link="{child}"/>',
+                f"  {_tag('origin', xyz=joint.xyz, rpy=joint.rpy)}{_tag('axis', xyz=joint.axis)}",
+                f"  {_tag('limit', **limits)}",
+                "</joint>",
+            ]
+            parent = child
+        out += [
+            '<link name="tip"/>',
+            '<joint name="tip_joint" type="fixed">',
+            f'  <parent link="{parent}"/><child link="tip"/>',
+            f"  {_tag('origin', xyz=self.tip_xyz, rpy=rpy_of(self.tip_rotation))}",
+            "</joint>",
+            "</robot>",
+        ]
+        return "\n".join(out) + "\n"
+
+    def unit(self, revolute: str, prismatic: str) -> str:
+        """Return the unit of a joint quantity: one for all joints, or both for an arm that mixes their kinds."""
+        kinds = {j.kind for j in self.joints}
+        if kinds == {"revolute"}:
+            return revolute
+        return prismatic if kinds == {"prismatic"} else f"{revolute} or {prismatic}"
+
+    def triangle_defects(self) -> list[str]:
+        """Return one line for every body whose principal moments no distribution of mass can have."""
+        out = []
+        for joint, body in zip(self.joints, self.bodies, strict=True):
+            a, b, c = np.linalg.eigvalsh(matrix(body.inertia))
+            if a + b < c * (1 - ROUND_OFF):
+                moments = f"{a:.4g} + {b:.4g} < {c:.4g} kg m^2"
+                out.append(f"the link moved by joint {joint.name!r} has principal moments {moments}")
+        return out
+
+
+def _rigid_part(link: str, children: dict[str, list[Edge]]) -> tuple[dict[str, Pose], list[Edge]]:
+    """Return the poses of all links fixed to `link`, in its frame, and the moving joints that leave them."""
+    poses, leaving = {link: HERE}, []
+    queue = [link]
+    for parent in queue:
+        for edge in children[parent]:
+            if edge.fixed:
+                joint = _seen_from(poses[parent], edge.joint)
+                poses[edge.child] = Pose(joint.xyz, rotation_of(joint.rpy))
+                queue.append(edge.child)
+            else:
+                leaving.append(edge)
+    return poses, leaving
+
+
+def _seen_from(parent: Pose, joint: Joint) -> Joint:
+    """Return the joint with its origin in the frame in which `parent` is given."""
+    if parent is HERE:
+        return joint
+    rpy = rpy_of(parent.rotation @ rotation_of(joint.rpy))
+    return joint._replace(xyz=parent.xyz + parent.rotation @ joint.xyz, rpy=rpy)
+
+
+def _lump(link: str, poses: dict[str, Pose], inertials: dict[str, Body]) -> Body:
+    """Return all links that move with `link` as one body."""
+    parts = []
+    for name, pose in poses.items():
+        if name in inertials:
+            check_body(f"link {name!r}", inertials[name], whole=False)
+            parts.append(turned(inertials[name], pose))
+    if not parts:
+        needs = "<inertial> in it or in a link fixed to it"
+        raise RobotError(f"moving link {link!r} has no inertia", needs=needs)
+    whole = lumped(parts)
+    check_body(f"link {link!r}", whole, whole=True)
+    return whole
+
+
+def _end_effector(
+    name: str | None, last: str, poses: dict[str, Pose], children: dict[str, list[Edge]]
+) -> str:
+    """Return the link that carries the end-effector frame."""
+    if name is None:
+        while children[last]:
+            if len(children[last]) > 1:
+                got = ", ".join(repr(link) for link in poses if not children[link])
+                needs = "the name of the end effector"
+                raise RobotError("several links end the chain", got=got, needs=needs)
+            last = children[last][0].child
+        return last
+    if name not in children:
+        raise NameUnknownError("end effector", name, children)
+    if name not in poses:
+        needs = f"a link that moves with the last joint: {', '.join(poses)}"
+        raise RobotError("moving joints follow the end effector", got=repr(name), needs=needs)
+    return name
+
+
+def _tag(tag: str, **values: ArrayLike) -> str:
+    """Return an element with numeric attributes that read back exactly."""
+    texts = {key: " ".join(repr(float(x)) for x in np.ravel(value)) for key, value in values.items()}
+    return f"<{tag} " + " ".join(f'{key}="{text}"' for key, text in texts.items()) + "/>"

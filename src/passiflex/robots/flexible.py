@@ -1,0 +1,137 @@
+"""The flexible-joint robot (2): a rigid arm whose motors act through springs and dampers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from types import SimpleNamespace
+from typing import NamedTuple
+
+import casadi as cs
+import numpy as np
+from numpy.typing import NDArray
+
+from passiflex.errors import SizeError, ValueRangeError
+from passiflex.layout import Field, Layout
+from passiflex.robots.arm import SerialArm
+from passiflex.robots.catalogue import read_description
+from passiflex.robots.linear_algebra import solve_spd
+
+
+class RobotState(NamedTuple):
+    """Link and motor coordinates and their velocities, each (n,)."""
+
+    q: cs.SX
+    theta: cs.SX
+    dq: cs.SX
+    dtheta: cs.SX
+
+
+class Acceleration(NamedTuple):
+    """Link and motor accelerations, and the joint torque that couples them."""
+
+    ddq: cs.SX
+    ddtheta: cs.SX
+    tau_a: cs.SX
+
+
+@dataclass(frozen=True, eq=False)
+class FlexibleJointRobot:
+    """A serial arm with elastic, damped joints: Spong's model (2).
+
+        M(q) q̈ + C(q, q̇) q̇ + ∇V(q) = τ_a + τ_e
+        B θ̈ + τ_a = τ_m
+        τ_a = K (θ − q) + D (θ̇ − q̇)
+
+    τ_a is the torque through the joint, positive on the link. K, D, B are diagonal.
+
+    Attributes
+    ----------
+    arm: The rigid links.
+    joint_stiffness, joint_damping, motor_inertia: K [N m/rad], D [N m s/rad], B [kg m²], (n,).
+    torque_limit, velocity_limit, position_limit: [N m], [rad/s], [rad]; (n,), (n,), (n, 2).
+    sources: Where each number comes from, or the word *assumed*.
+    """
+
+    name: str
+    arm: SerialArm
+    joint_stiffness: NDArray[np.float64]
+    joint_damping: NDArray[np.float64]
+    motor_inertia: NDArray[np.float64]
+    torque_limit: NDArray[np.float64]
+    velocity_limit: NDArray[np.float64]
+    position_limit: NDArray[np.float64]
+    sources: dict[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for name in ("joint_stiffness", "joint_damping", "motor_inertia"):
+            value, unit = getattr(self, name), {f.name: f.unit for f in self.layout}[name]
+            if np.shape(value) != (self.n,):
+                raise SizeError(
+                    f"{name} of robot {self.name!r}", got=np.shape(value), needs=f"({self.n},) in {unit}"
+                )
+            if not (np.isfinite(value) & (np.asarray(value) > 0)).all():
+                raise ValueRangeError(
+                    f"{name} of robot {self.name!r}", got=value, needs=f"positive numbers in {unit}"
+                )
+
+    @classmethod
+    def load(cls, name: str | Path = "iiwa14") -> FlexibleJointRobot:
+        """Read a robot of the catalogue by name, or the user's own by the path of its file.
+
+        Raises
+        ------
+        NameUnknownError, RobotError
+            If there is no such robot, or its description is not usable.
+        """
+        d = read_description(name)
+        return cls(
+            name=d.name,
+            arm=SerialArm(d.chain),
+            joint_stiffness=d.stiffness,
+            joint_damping=d.damping,
+            motor_inertia=d.motor_inertia,
+            torque_limit=d.torque_limit,
+            velocity_limit=d.velocity_limit,
+            position_limit=d.position_limit,
+            sources=d.sources,
+        )
+
+    @property
+    def n(self) -> int:
+        """Return the number of joints."""
+        return self.arm.n
+
+    @cached_property
+    def layout(self) -> Layout:
+        """Return all physical parameters: the arm's, then K, D, B."""
+        n = self.n
+        return self.arm.layout + Layout(
+            (
+                Field("joint_stiffness", (n,), "N m/rad", "K"),
+                Field("joint_damping", (n,), "N m s/rad", "D"),
+                Field("motor_inertia", (n,), "kg m^2", "B, reflected through the gear"),
+            )
+        )
+
+    def nominal(self, gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)) -> dict[str, np.ndarray]:
+        """Return the robot's own numbers for `layout`."""
+        return self.arm.nominal(gravity) | {
+            "joint_stiffness": self.joint_stiffness,
+            "joint_damping": self.joint_damping,
+            "motor_inertia": self.motor_inertia,
+        }
+
+    def joint_torque(self, x: RobotState, m: SimpleNamespace) -> cs.SX:
+        """Return τ_a = K (θ − q) + D (θ̇ − q̇) [N m], the last line of (2)."""
+        return m.joint_stiffness * (x.theta - x.q) + m.joint_damping * (x.dtheta - x.dq)
+
+    def acceleration(self, x: RobotState, tau_m: cs.SX, tau_e: cs.SX, m: SimpleNamespace) -> Acceleration:
+        """Return q̈, θ̈ of (2) under the motor torque τ_m and the external joint torque τ_e [N m]."""
+        tau_a = self.joint_torque(x, m)
+        return Acceleration(
+            ddq=solve_spd(self.arm.mass_matrix(x.q, m), tau_a + tau_e - self.arm.bias_torque(x.q, x.dq, m)),
+            ddtheta=(tau_m - tau_a) / m.motor_inertia,
+            tau_a=tau_a,
+        )

@@ -1,0 +1,245 @@
+"""The shipped robots against known postures and each other, and every message about a robot file."""
+
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+import yaml
+
+from passiflex.errors import NameUnknownError, RobotError
+from passiflex.robots.catalogue import UNITS, catalogue, read_description
+
+IIWAS = ("iiwa14", "iiwa14_stuerz")
+
+
+def oracle(name: str) -> tuple[pin.Model, pin.Data]:
+    model = pin.buildModelFromXML(read_description(name).chain.to_urdf())
+    return model, model.createData()
+
+
+def tip(name: str, q: np.ndarray) -> np.ndarray:
+    model, data = oracle(name)
+    pin.framesForwardKinematics(model, data, q)
+    return data.oMf[model.getFrameId("tip")].homogeneous
+
+
+def test_names():
+    assert catalogue() == ("iiwa14", "iiwa14_stuerz", "planar2r")
+
+
+@pytest.mark.parametrize("name", catalogue())
+def test_shipped_robots_are_complete(name):
+    d = read_description(name)
+    n = d.chain.n
+    assert d.name == name
+    assert d.description
+    for value in (d.stiffness, d.damping, d.motor_inertia, d.torque_limit, d.velocity_limit):
+        assert value.shape == (n,)
+        assert (value > 0).all()
+    assert d.position_limit.shape == (n, 2)
+    assert set(d.sources) == {"links", *UNITS}
+    assert all(d.sources.values())
+    joints = d.chain.joints
+    np.testing.assert_allclose(d.position_limit, [(j.lower, j.upper) for j in joints], rtol=1e-15)
+    np.testing.assert_allclose(d.velocity_limit, [j.velocity for j in joints], rtol=1e-15)
+    np.testing.assert_array_equal(d.torque_limit, [j.effort for j in joints])
+
+
+@pytest.mark.parametrize("name", IIWAS)
+def test_upright_iiwa_reaches_1306_mm(name):
+    expected = np.eye(4)
+    expected[2, 3] = 1.306
+    np.testing.assert_allclose(tip(name, np.zeros(7)), expected, atol=1e-15)
+
+
+def test_both_iiwas_have_the_same_kinematics():
+    for q in np.random.default_rng(0).uniform(-2, 2, (10, 7)):
+        np.testing.assert_allclose(tip(IIWAS[0], q), tip(IIWAS[1], q), atol=5e-15)
+
+
+def test_both_iiwas_need_about_the_same_torque_against_gravity():
+    """Two independent sources: 2 N m of 80 is what they differ by; a frame turned by mistake costs 19 N m."""
+    (a, a_data), (b, b_data) = (oracle(name) for name in IIWAS)
+    for q in [np.array([0, np.pi / 2, 0, 0, 0, 0, 0]), *np.random.default_rng(0).uniform(-2, 2, (30, 7))]:
+        ours = pin.computeGeneralizedGravity(a, a_data, q)
+        theirs = pin.computeGeneralizedGravity(b, b_data, q)
+        np.testing.assert_allclose(ours, theirs, atol=2.0)
+
+
+def test_iiwa_joint_data_in_si():
+    d = read_description("iiwa14")
+    np.testing.assert_array_equal(d.stiffness, np.full(7, 1e4))
+    np.testing.assert_array_equal(d.damping, np.full(7, 5.0))
+    np.testing.assert_array_equal(d.motor_inertia, [3.19, 3.05, 1.98, 2.05, 0.787, 0.391, 0.394])
+    assert d.velocity_limit[3] == pytest.approx(1.3089969389957472, rel=1e-15)
+    assert "assumed" in d.sources["joint_stiffness"]
+    assert "[2nd]" in d.sources["motor_inertia"]
+
+
+def test_planar_arm_lies_along_x_and_lifts_with_positive_angles():
+    np.testing.assert_allclose(tip("planar2r", np.zeros(2))[:3, 3], [0.9, 0, 0], atol=1e-15)
+    np.testing.assert_allclose(tip("planar2r", np.array([np.pi / 2, 0]))[:3, 3], [0, 0, 0.9], atol=1e-15)
+    model, data = oracle("planar2r")
+    q1, q2 = 0.3, 0.5
+    g = 9.81
+    torque = pin.computeGeneralizedGravity(model, data, np.array([q1, q2]))
+    elbow = 2 * g * 0.2 * np.cos(q1 + q2)
+    np.testing.assert_allclose(torque, [(3 * 0.25 + 2 * 0.5) * g * np.cos(q1) + elbow, elbow], rtol=1e-14)
+
+
+BODY = '<inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>'
+SLIDER = f"""<robot name="slider"><link name="base"/>
+<link name="cart">{BODY}</link>
+<link name="rod">{BODY}</link>
+<joint name="slide" type="prismatic"><parent link="base"/><child link="cart"/></joint>
+<joint name="hinge" type="revolute"><parent link="cart"/><child link="rod"/></joint></robot>
+"""
+GOOD = {
+    "name": "slider",
+    "description": "a cart with a rod",
+    "urdf": "slider.urdf",
+    "end_effector": "rod",
+    "source": "assumed",
+    "joint_stiffness": {"value": [2.0, 30.0], "unit": ["N/mm", "N m/deg"], "source": "assumed"},
+    "joint_damping": {"value": 4, "unit": ["N s/m", "N m s/rad"], "source": "assumed"},
+    "motor_inertia": {"value": [1, 5e3], "unit": ["kg", "kg cm^2"], "source": "assumed"},
+    "torque_limit": {"value": [1, 1], "unit": ["kN", "N m"], "source": "assumed"},
+    "velocity_limit": {"value": [500, 90], "unit": ["mm/s", "deg/s"], "source": "assumed"},
+    "position_limit": {"value": [[0, 800], [-90, 180]], "unit": ["mm", "deg"], "source": "assumed"},
+}
+
+
+@pytest.fixture
+def write(tmp_path: Path):
+    (tmp_path / "slider.urdf").write_text(SLIDER)
+
+    def _write(entry: str | None = None, **changes) -> Path:
+        content = GOOD | ({entry: GOOD[entry] | changes} if entry else changes)
+        content = {k: v for k, v in content.items() if v is not None}
+        path = tmp_path / "slider.yaml"
+        path.write_text(yaml.safe_dump(content))
+        return path
+
+    return _write
+
+
+def test_mixed_units_become_si(write):
+    d = read_description(write())
+    np.testing.assert_allclose(d.stiffness, [2000, 30 * 180 / np.pi], rtol=1e-15)
+    np.testing.assert_allclose(d.damping, [4, 4])
+    np.testing.assert_allclose(d.motor_inertia, [1, 0.5])
+    np.testing.assert_allclose(d.torque_limit, [1000, 1])
+    np.testing.assert_allclose(d.velocity_limit, [0.5, np.pi / 2])
+    np.testing.assert_allclose(d.position_limit, [[0, 0.8], [-np.pi / 2, np.pi]])
+
+
+@pytest.mark.parametrize(("value", "expected"), [(1, [[-1, 1], [-1, 1]]), ([1, 2], [[-1, 1], [-2, 2]])])
+def test_symmetric_position_limits(write, value, expected):
+    d = read_description(write("position_limit", value=value, unit=["m", "rad"]))
+    np.testing.assert_array_equal(d.position_limit, expected)
+
+
+def test_absolute_urdf_path_and_text_path(write, tmp_path):
+    path = write(urdf=str(tmp_path / "slider.urdf"))
+    assert read_description(str(path)).chain.n == 2
+
+
+def test_limits_may_be_infinite(write):
+    assert np.isinf(read_description(write("torque_limit", value=float("inf"))).torque_limit).all()
+
+
+WRONG = {
+    "unit of the other kind": (
+        ("joint_stiffness", {"unit": "N m/rad"}),
+        "entry joint_stiffness.unit does not fit prismatic joint 1; got 'N m/rad'; "
+        "needs one of N/m, kN/m, N/mm$",
+    ),
+    "unknown unit": (
+        ("velocity_limit", {"unit": ["m/s", "rpm"]}),
+        "entry velocity_limit.unit does not fit revolute joint 2; got 'rpm'; needs one of rad/s, deg/s",
+    ),
+    "units": (
+        ("motor_inertia", {"unit": ["kg"]}),
+        "entry motor_inertia.unit has the wrong size; got 1; needs one unit, or 2",
+    ),
+    "size": (
+        ("joint_damping", {"value": [1, 2, 3]}),
+        r"entry joint_damping.value has the wrong size; got \(3,\); needs one number, 2 numbers$",
+    ),
+    "pairs elsewhere": (
+        ("torque_limit", {"value": [[1, 2], [1, 2]]}),
+        r"entry torque_limit.value has the wrong size; got \(2, 2\); needs one number, 2 numbers$",
+    ),
+    "size of pairs": (
+        ("position_limit", {"value": [1, 2, 3]}),
+        r"entry position_limit.value has the wrong size; got \(3,\); "
+        r"needs one number, 2 numbers, or 2 pairs \[lower, upper\]$",
+    ),
+    "zero": (
+        ("joint_damping", {"value": [0, 1]}),
+        r"entry joint_damping.value is impossible; got \[0.0, 1.0\]; needs finite numbers above 0",
+    ),
+    "infinite": (
+        ("joint_stiffness", {"value": float("inf")}),
+        r"entry joint_stiffness.value is impossible; got \[inf, inf\]",
+    ),
+    "negative limit": (
+        ("torque_limit", {"value": -1}),
+        r"entry torque_limit.value is impossible; .*needs numbers above 0",
+    ),
+    "pair order": (
+        ("position_limit", {"value": [[1, 0], [0, 1]]}),
+        r"entry position_limit.value is impossible; got .*; needs pairs with lower < upper",
+    ),
+    "no source": (
+        ("torque_limit", {"source": " "}),
+        "has wrong entries; got entry torque_limit.source: .*at least 1 character",
+    ),
+    "words": (("torque_limit", {"value": "strong"}), "has wrong entries; got entry torque_limit.value: "),
+    "extra": (
+        (None, {"colour": "red"}),
+        "has wrong entries; got entry colour: Extra inputs are not permitted",
+    ),
+    "missing": (
+        (None, {"motor_inertia": None}),
+        "has wrong entries; got entry motor_inertia: Field required",
+    ),
+    "urdf": (
+        (None, {"urdf": "none.urdf"}),
+        "entry urdf: no such file; got '.*none.urdf'; needs a path, absolute or from the folder of this file",
+    ),
+}
+
+
+@pytest.mark.parametrize(("change", "message"), WRONG.values(), ids=WRONG)
+def test_wrong_entries_name_the_file_and_the_entry(write, change, message):
+    entry, changes = change
+    with pytest.raises(RobotError, match=r"slider\.yaml:? " + message):
+        read_description(write(entry, **changes))
+
+
+def test_files_that_are_no_robot_files(tmp_path):
+    path = tmp_path / "bad.yaml"
+    with pytest.raises(
+        RobotError, match=r"robot file '.*bad.yaml' cannot be read; got .*No such file.*; needs a YAML file"
+    ):
+        read_description(path)
+    path.write_text("name: x\nvalue: [1, 2\n")
+    with pytest.raises(
+        RobotError, match=r"bad.yaml is not well-formed YAML, line 3; got expected.*; needs a YAML file"
+    ):
+        read_description(path)
+    path.write_text("- 1\n- 2\n")
+    with pytest.raises(
+        RobotError, match=r"bad.yaml is not a robot file; got list; needs the entries name, description, urdf"
+    ):
+        read_description(path)
+
+
+def test_unknown_name_lists_the_nearest():
+    with pytest.raises(
+        NameUnknownError,
+        match="unknown robot; got 'iiwa'; needs one of iiwa14, iiwa14_stuerz, planar2r; try 'iiwa14'",
+    ):
+        read_description("iiwa")
