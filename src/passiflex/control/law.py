@@ -1,0 +1,109 @@
+"""The proposed law: inner loop (5), impedance (12), gravity and null space (32), as one pure function."""
+
+from __future__ import annotations
+
+import abc
+from dataclasses import dataclass
+from functools import cached_property
+from types import SimpleNamespace
+from typing import final
+
+import casadi as cs
+
+from passiflex.control.gravity import AbstractGravity, RobotGravity
+from passiflex.control.inner_loop import motor_torque, shaped_damping, shaped_motion
+from passiflex.control.null_space import null_space_torque
+from passiflex.control.signals import Command, LawEnergy, Measurement, Reference
+from passiflex.control.task import AbstractTask, PoseTask
+from passiflex.layout import Field, Layout
+from passiflex.robots.flexible import FlexibleJointRobot
+from passiflex.robots.linear_algebra import solve_spd
+
+
+class AbstractLaw(abc.ABC):
+    """A control law: a pure function of measurement, reference, the robot's model and gains.
+
+    It holds structure only (which robot, which task, which gravity choice). The numbers, of the model
+    (`robot.layout`) and of the gains (`layout`), are run-time inputs.
+    """
+
+    robot: FlexibleJointRobot
+    task: AbstractTask
+    gravity: AbstractGravity
+    has_tank: bool
+
+    @property
+    @abc.abstractmethod
+    def layout(self) -> Layout:
+        """Return the gains."""
+
+    @abc.abstractmethod
+    def command(
+        self, y: Measurement, reference: Reference, m: SimpleNamespace, g: SimpleNamespace
+    ) -> Command:
+        """Return the motor torque and the energy that the law claims, for the model m and gains g."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class ImpedanceLaw(AbstractLaw):
+    """The paper's law: (5) with (12) and (32), and the storage (14).
+
+        τ_u = −J(φ)ᵀ ∂U/∂x − J(φ)ᵀ D_x J(φ) φ̇ + τ_g − D_ns φ̇
+
+    The spring's wrench is the true gradient of the potential; the damper uses the geometric Jacobian.
+    """
+
+    robot: FlexibleJointRobot
+    task: AbstractTask = PoseTask()
+    gravity: AbstractGravity = RobotGravity()
+    has_tank = True
+
+    @cached_property
+    def layout(self) -> Layout:
+        """Return the gains of the law."""
+        n, k = self.robot.n, self.task.size
+        return Layout(
+            (
+                Field("shaped_stiffness", (n,), "N m/rad", "K_e"),
+                Field("shaped_inertia", (n,), "kg m^2", "B_e"),
+                Field("stiffness", (k, k), "N/m, N, N m/rad", "K_x"),
+                Field("damping", (k, k), "N s/m, N s, N m s/rad", "D_x"),
+                Field("null_space_damping", (), "1/s", "k_ns"),
+                Field("regularisation", (), "1/kg", "ε of Λ = (J M⁻¹ Jᵀ + ε I)⁻¹"),
+            )
+        )
+
+    def command(
+        self, y: Measurement, reference: Reference, m: SimpleNamespace, g: SimpleNamespace
+    ) -> Command:
+        """Return τ_m of (5) and the energies of (14) and (36)."""
+        arm, rows = self.robot.arm, slice(0, self.task.size)
+        K, B, K_e, B_e = m.joint_stiffness, m.motor_inertia, g.shaped_stiffness, g.shaped_inertia
+        D_e = shaped_damping(K, m.joint_damping, K_e)
+        phi, dphi = shaped_motion(y.q, y.theta, y.dq, y.dtheta, K, K_e)  # (11)
+
+        M = arm.mass_matrix(y.q, m)
+        J_q = arm.jacobian(y.q, m)
+        J = arm.jacobian(phi, m)[rows, :]
+        dx = J @ dphi
+        spring = self.task.spring(arm.pose(phi, m), reference.pose, g.stiffness)
+        weight = self.gravity.compensation(arm, phi, K_e, m)
+        tau_null = null_space_torque(M, J_q[rows, :], g.null_space_damping, dphi, g.regularisation)  # (32)
+        tau_u = -J.T @ (spring.gradient[rows] + g.damping @ dx) + weight.torque + tau_null  # (12)
+
+        tau_e = J_q.T @ y.F_e
+        expected = solve_spd(M, y.tau_a + tau_e - arm.bias_torque(y.q, y.dq, m))
+        tau_m = motor_torque(expected, y.tau_a, tau_u, K, B, K_e, B_e)  # (5)
+        stretch = dphi - y.dq
+        energy = LawEnergy(
+            motor_kinetic=cs.dot(dphi, B_e * dphi) / 2,
+            joint_spring=cs.dot(phi - y.q, K_e * (phi - y.q)) / 2,
+            cartesian_spring=spring.potential,
+            gravity_storage=weight.storage,
+            joint_damping=cs.dot(stretch, D_e * stretch),
+            cartesian_damping=cs.dot(dx, g.damping @ dx),
+            null_space_damping=-cs.dot(dphi, tau_null),
+            reference_power=cs.dot(spring.reference_gradient, reference.velocity),  # (21)
+        )
+        return Command(tau_m, tau_u, phi, dphi, energy)

@@ -1,0 +1,86 @@
+"""The baseline [23]: impedance control of a rigid robot by exact cancellation of its dynamics."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from types import SimpleNamespace
+from typing import final
+
+import casadi as cs
+
+from passiflex.control.gravity import AbstractGravity, RobotGravity
+from passiflex.control.law import AbstractLaw
+from passiflex.control.null_space import inverse_cartesian_inertia, null_space_torque
+from passiflex.control.signals import Command, LawEnergy, Measurement, Reference
+from passiflex.control.task import AbstractTask, PoseTask
+from passiflex.layout import Field, Layout
+from passiflex.robots.flexible import FlexibleJointRobot
+from passiflex.robots.linear_algebra import solve_spd
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class RigidImpedanceLaw(AbstractLaw):
+    """The rigid baseline (theory note 2.9), read at and sent to the motors as if the joints were rigid.
+
+        τ_m = M J̄ (M_x⁻¹ (F_e − D_x ẋ − ∂U/∂x) − J̇ q̇) + C q̇ + ∇V − Jᵀ F_e − (I − Jᵀ J̄ᵀ) k_ns M q̇
+
+    A rigid robot has one position, and a robot reads it at its motors: q means θ here. (Read at the
+    links, the same law is unstable on the iiwa already at rest: poles 0.25 ± 77j 1/s with the link
+    inertia, 1.5 ± 77j 1/s with the motor inertia in it.) M is the link inertia plus `carried_inertia`:
+    zero gives the baseline as published, the motor inertia B the variant that knows its motors. It has
+    no tank: whoever moves the reference pays. As it shapes nothing, what its motors store is that of
+    the real joint (φ = θ, K_e = K, B_e = B).
+    """
+
+    robot: FlexibleJointRobot
+    task: AbstractTask = PoseTask()
+    gravity: AbstractGravity = RobotGravity()
+    has_tank = False
+
+    @cached_property
+    def layout(self) -> Layout:
+        """Return the gains of the law."""
+        k = self.task.size
+        return Layout(
+            (
+                Field("target_inertia", (k, k), "kg, kg m, kg m^2", "M_x"),
+                Field("stiffness", (k, k), "N/m, N, N m/rad", "K_x"),
+                Field("damping", (k, k), "N s/m, N s, N m s/rad", "D_x"),
+                Field("null_space_damping", (), "1/s", "k_ns"),
+                Field("regularisation", (), "1/kg", "ε of Λ = (J M⁻¹ Jᵀ + ε I)⁻¹"),
+                Field("carried_inertia", (self.robot.n,), "kg m^2", "motor inertia that the law knows of"),
+            )
+        )
+
+    def command(
+        self, y: Measurement, reference: Reference, m: SimpleNamespace, g: SimpleNamespace
+    ) -> Command:
+        """Return the torque of the rigid law, with U and its damping as the claimed energies."""
+        arm, rows = self.robot.arm, slice(0, self.task.size)
+        q, dq = y.theta, y.dtheta
+        M = arm.mass_matrix(q, m) + cs.diag(g.carried_inertia)
+        J_full = arm.jacobian(q, m)
+        J = J_full[rows, :]
+        dx = J @ dq
+        bias = cs.jtimes(dx, q, dq)  # J̇ q̇
+        spring = self.task.spring(arm.pose(q, m), reference.pose, g.stiffness)
+        mobility = inverse_cartesian_inertia(M, J, g.regularisation)
+
+        wanted = solve_spd(g.target_inertia, y.F_e[rows] - g.damping @ dx - spring.gradient[rows]) - bias
+        damped = -null_space_torque(M, J, g.null_space_damping, dq, g.regularisation)
+        tau_m = J.T @ solve_spd(mobility, wanted) + arm.bias_torque(q, dq, m) - J_full.T @ y.F_e - damped
+
+        stretch = dq - y.dq
+        energy = LawEnergy(
+            motor_kinetic=cs.dot(dq, m.motor_inertia * dq) / 2,
+            joint_spring=cs.dot(q - y.q, m.joint_stiffness * (q - y.q)) / 2,
+            cartesian_spring=spring.potential,
+            gravity_storage=-arm.potential_energy(q, m),
+            joint_damping=cs.dot(stretch, m.joint_damping * stretch),
+            cartesian_damping=cs.dot(dx, g.damping @ dx),
+            null_space_damping=cs.dot(dq, damped),
+            reference_power=cs.dot(spring.reference_gradient, reference.velocity),
+        )
+        return Command(tau_m, tau_m, q, dq, energy)

@@ -1,0 +1,97 @@
+"""The Cartesian spring of (12): a potential on poses, and its true gradient."""
+
+from __future__ import annotations
+
+import abc
+from dataclasses import dataclass
+from typing import ClassVar, NamedTuple
+
+import casadi as cs
+
+from passiflex.robots.arm import EndEffectorPose
+
+
+class Spring(NamedTuple):
+    """A potential and its derivatives on SE(3), in world axes.
+
+    Attributes
+    ----------
+    potential: U(x; x_d) [J], ≥ 0 and zero at x = x_d.
+    gradient: The wrench that holds the end effector against the spring, (6,) N and N m:
+        U̇ = gradientᵀ ẋ with x_d at rest, ẋ linear then angular velocity.
+    reference_gradient: The same for the reference, (6,): P_X = reference_gradientᵀ ẋ_d, (21).
+    """
+
+    potential: cs.SX
+    gradient: cs.SX
+    reference_gradient: cs.SX
+
+
+def manifold_gradient(potential: cs.SX, position: cs.SX, rotation: cs.SX) -> cs.SX:
+    """Return the gradient of U(p, R) for ṗ = v and Ṙ = [ω]× R, as a wrench (6,) in world axes.
+
+    With rⱼ the columns of R, U̇ = Σⱼ (∂U/∂rⱼ)ᵀ (ω × rⱼ) = ωᵀ Σⱼ rⱼ × ∂U/∂rⱼ.
+    """
+    slope = cs.gradient(potential, rotation)
+    torque = sum(cs.cross(rotation[:, j], slope[:, j]) for j in range(3))
+    return cs.vertcat(cs.gradient(potential, position), torque)
+
+
+class AbstractTask(abc.ABC):
+    """Which part of the pose the spring and the damper act on.
+
+    `size` rows of the Jacobian take part; K_x and D_x are (size, size). Translation is measured in
+    world axes; rotation in the axes of the reference frame.
+    """
+
+    size: ClassVar[int]
+
+    @abc.abstractmethod
+    def potential(self, pose: EndEffectorPose, desired: EndEffectorPose, stiffness: cs.SX) -> cs.SX:
+        """Return U(x; x_d) [J] for the stiffness K_x (size, size)."""
+
+    def spring(self, pose: EndEffectorPose, desired: EndEffectorPose, stiffness: cs.SX) -> Spring:
+        """Return the potential with its exact gradients."""
+        p, R = cs.SX.sym("p", 3), cs.SX.sym("R", 3, 3)
+        p_d, R_d = cs.SX.sym("p_d", 3), cs.SX.sym("R_d", 3, 3)
+        K = cs.SX.sym("K", self.size, self.size)
+        U = self.potential(EndEffectorPose(p, R), EndEffectorPose(p_d, R_d), K)
+        f = cs.Function(
+            "U", [p, R, p_d, R_d, K], [U, manifold_gradient(U, p, R), manifold_gradient(U, p_d, R_d)]
+        )
+        return Spring(*f(pose.position, pose.rotation, desired.position, desired.rotation, stiffness))
+
+
+@dataclass(frozen=True)
+class PoseTask(AbstractTask):
+    """All six directions, with the trace potential for the rotation.
+
+    U = ½ eᵀ K_t e + eᵀ K_c ε + tr(G (I − R_dᵀ R)),  G = ½ tr(K_o) I − K_o
+
+    with K_x = [[K_t, K_c], [K_cᵀ, K_o]], e = p − p_d and ε = ½ vee(R_dᵀR − RᵀR_d). The trace term is
+    2 vᵀ K_o v with v the vector part of the quaternion of R_dᵀR, never less than ½ εᵀ K_o ε: so U is
+    never less than ½ [e; ε]ᵀ K_x [e; ε], also with coupling, and is smooth everywhere.
+    """
+
+    size: ClassVar[int] = 6
+
+    def potential(self, pose: EndEffectorPose, desired: EndEffectorPose, stiffness: cs.SX) -> cs.SX:
+        """Return U [J]."""
+        K_t, K_c, K_o = stiffness[:3, :3], stiffness[:3, 3:], stiffness[3:, 3:]
+        e = pose.position - desired.position
+        relative = desired.rotation.T @ pose.rotation
+        epsilon = cs.inv_skew(relative - relative.T) / 2
+        G = cs.trace(K_o) / 2 * cs.SX.eye(3) - K_o
+        return cs.dot(e, K_t @ e) / 2 + cs.dot(e, K_c @ epsilon) + cs.trace(G @ (cs.SX.eye(3) - relative))
+
+
+@dataclass(frozen=True)
+class PositionTask(AbstractTask):
+    """Position only: U = ½ eᵀ K_x e with e = p − p_d; the orientation is free."""
+
+    size: ClassVar[int] = 3
+
+    def potential(self, pose: EndEffectorPose, desired: EndEffectorPose, stiffness: cs.SX) -> cs.SX:
+        """Return U [J]."""
+        e = pose.position - desired.position
+        return cs.dot(e, stiffness @ e) / 2
