@@ -1,0 +1,14 @@
+"""CasADi functions as compiled code: generate C, compile once, call without copies, integrate."""
+
+from passiflex.native.compiler import Compiler as Compiler
+from passiflex.native.compiler import find_compiler as find_compiler
+from passiflex.native.fixed_step import DRIVER as DRIVER
+from passiflex.native.fixed_step import Advance as Advance
+from passiflex.native.fixed_step import FixedStep as FixedStep
+from passiflex.native.fixed_step import Refinement as Refinement
+from passiflex.native.fixed_step import fastest_pole as fastest_pole
+from passiflex.native.fixed_step import stable_step as stable_step
+from passiflex.native.function import NativeFunction as NativeFunction
+from passiflex.native.library import cache_folder as cache_folder
+from passiflex.native.library import compile_functions as compile_functions
+from passiflex.native.library import load_external as load_external

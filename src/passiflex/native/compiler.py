@@ -1,0 +1,156 @@
+"""Find a C compiler and turn one C file into one shared library.
+
+The order is `$CC`, then `cc`, `gcc`, `clang` on the path, then the C compiler inside the package
+`ziglang` (the extra `passiflex[zig]`). `PASSIFLEX_COMPILER=none` looks for none; `=zig` takes that one.
+"""
+
+from __future__ import annotations
+
+import functools
+import importlib.metadata
+import importlib.util
+import os
+import platform
+import shlex
+import shutil
+import subprocess
+import sys
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+from passiflex.errors import CompilerError, NameUnknownError
+
+# Only what the header exports is visible: calls inside the library can then be inlined.
+FLAGS = (
+    "-O2",
+    "-fPIC",
+    "-dynamiclib" if sys.platform == "darwin" else "-shared",
+    "-fno-math-errno",
+    "-ffp-contract=fast",
+    "-fvisibility=hidden",
+    "-DGCC_HASCLASSVISIBILITY",
+)
+SUFFIX = ".dylib" if sys.platform == "darwin" else ".so"
+_ZIG_MACHINES = {"amd64": "x86_64", "arm64": "aarch64", "i686": "x86", "ppc64le": "powerpc64le"}
+
+
+@dataclass(frozen=True)
+class Compiler:
+    """One usable C compiler.
+
+    Parameters
+    ----------
+    argv: The command and its fixed arguments.
+    identity: Path and version; two compilers with the same identity make the same code.
+    flags: The flags that every compilation gets.
+    """
+
+    argv: tuple[str, ...]
+    identity: str
+    flags: tuple[str, ...] = FLAGS
+
+    def build(self, source: Path, target: Path) -> None:
+        """Compile the C file `source` into the shared library `target`.
+
+        Raises
+        ------
+        CompilerError
+            With the last lines that the compiler wrote.
+        """
+        command = [*self.argv, *self.flags, str(source), "-o", str(target), "-lm"]
+        try:
+            done = subprocess.run(command, capture_output=True, text=True, errors="replace", check=False)
+        except OSError as error:
+            raise CompilerError("the C compiler cannot be started", got=f"{self.argv[0]}: {error}") from error
+        if done.returncode or not target.is_file():
+            raise CompilerError(
+                f"{shlex.join(self.argv)} stopped with exit status {done.returncode} and made no library",
+                got="\n" + "\n".join(done.stderr.splitlines()[-12:]) + "\n",
+                try_="another compiler in $CC, or PASSIFLEX_COMPILER=none to run without one, slower",
+            )
+
+
+def find_compiler() -> Compiler | None:
+    """Return the C compiler to use, or None where there is none; asked again only if the environment changes.
+
+    Raises
+    ------
+    CompilerError
+        If `$CC` is set and cannot compile, or zig was asked for and is not installed.
+    NameUnknownError
+        If `PASSIFLEX_COMPILER` is neither "none" nor "zig".
+    """
+    env = os.environ
+    return _find(env.get("PASSIFLEX_COMPILER", ""), env.get("CC", ""), env.get("PATH", ""))
+
+
+@functools.cache
+def _find(choice: str, cc: str, path: str) -> Compiler | None:
+    if choice not in ("", "none", "zig"):
+        raise NameUnknownError("PASSIFLEX_COMPILER", choice, ("none", "zig"))
+    if choice == "none" or os.name == "nt":
+        return None
+    if choice == "zig":
+        zig = _zig()
+        if zig is None:
+            raise CompilerError(
+                "PASSIFLEX_COMPILER=zig finds no zig",
+                needs="the package ziglang",
+                try_="installing passiflex[zig]",
+            )
+        return zig
+    if cc.strip():
+        try:
+            return _system(tuple(shlex.split(cc)), path)
+        except (CompilerError, ValueError) as error:
+            raise CompilerError(
+                "the compiler in $CC does not work",
+                got=f"CC={cc!r} ({getattr(error, 'what', error)})",
+                needs="a command that compiles C",
+                try_="unsetting CC",
+            ) from error
+    for name in ("cc", "gcc", "clang"):
+        if shutil.which(name, path=path):
+            try:
+                return _system((name,), path)
+            except CompilerError:
+                continue
+    return _zig()
+
+
+def _system(argv: tuple[str, ...], path: str) -> Compiler:
+    """Return the compiler behind `argv`, with the flags that it was seen to accept."""
+    where = shutil.which(argv[0], path=path)
+    if where is None:
+        raise CompilerError("no such command", got=repr(argv[0]))
+    argv = (where, *argv[1:])
+    version = subprocess.run(
+        [*argv, "--version"], capture_output=True, text=True, errors="replace", check=False
+    )
+    identity = f"{shlex.join(argv)}\n{version.stdout}"
+    with tempfile.TemporaryDirectory(prefix="passiflex-") as folder:
+        source = Path(folder, "probe.c")
+        source.write_text("double probe(double x) { return x + 1; }\n")
+        for flags in ((*FLAGS, "-march=native"), FLAGS):
+            compiler = Compiler(argv, identity, flags)
+            try:
+                compiler.build(source, source.with_suffix(SUFFIX))
+            except CompilerError as error:
+                failure = error
+            else:
+                return compiler
+    raise failure
+
+
+def _zig() -> Compiler | None:
+    """Return the compiler of the package `ziglang`, or None where it is not installed."""
+    if importlib.util.find_spec("ziglang") is None or not sys.platform.startswith(("linux", "darwin")):
+        return None
+    machine = _ZIG_MACHINES.get(platform.machine().lower(), platform.machine().lower())
+    if sys.platform == "darwin":
+        target = f"{machine}-macos"
+    else:
+        target = f"{machine}-linux-{'gnu' if platform.libc_ver()[0] == 'glibc' else 'musl'}"
+    argv = (sys.executable, "-m", "ziglang", "cc", "-target", target, "-mcpu=native")
+    return Compiler(argv, f"{shlex.join(argv)}\nziglang {importlib.metadata.version('ziglang')}")
