@@ -1,0 +1,219 @@
+"""The settings of the two laws in a scenario: task, gains, shaping. All numbers in SI units."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, ClassVar, Literal, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
+
+from passiflex.errors import ValueRangeError
+from passiflex.simulation.quantity import Quantity
+from passiflex.simulation.section import Mistakes, Section
+
+Vector = tuple[float, ...]
+Matrix = tuple[Vector, ...]
+Positive = Annotated[float, Quantity("1", above=0)]
+
+
+def _definite(matrix: Matrix) -> Matrix:
+    """Return a matrix that is symmetric and positive definite."""
+    from passiflex.control.damping_design import require_positive_definite
+
+    try:
+        require_positive_definite("the matrix", np.array(matrix))
+    except ValueRangeError as error:
+        raise ValueError(str(error)) from None
+    return matrix
+
+
+def _block(value: float | Vector | Matrix) -> Matrix:
+    """Return the 3×3 block of one number, 3 numbers or 3×3."""
+    if np.ndim(value) == 2:
+        return _definite(value)  # type: ignore[arg-type]
+    return tuple(map(tuple, np.diag(np.broadcast_to(value, 3)).tolist()))
+
+
+def _three(unit: str) -> Quantity:
+    return Quantity(unit, ((), (3,), (3, 3)), above=0)
+
+
+_BLOCK = AfterValidator(_block)
+_FULL = Annotated[Matrix, Quantity("", ((3, 3), (6, 6))), AfterValidator(_definite)]
+
+
+class _Shaped(Section):
+    """A joint quantity that the inner loop makes: a multiple of the law's own, or numbers."""
+
+    ratio: Positive | None = Field(default=None, description="multiple of the law's own value")
+    value: float | Vector | None = Field(default=None, description="one number for all joints, or one each")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _bare(cls, written: Any) -> Any:
+        quantity = isinstance(written, dict) and written and set(written) <= {"value", "unit"}
+        return written if isinstance(written, dict | cls) and not quantity else {"value": written}
+
+    @model_validator(mode="after")
+    def _one_way(self) -> Self:
+        if (self.ratio is None) == (self.value is None):
+            raise ValueError("needs either a ratio or a quantity")
+        return self
+
+    def resolve(self, own: ArrayLike) -> NDArray[np.float64]:
+        """Return the values (n,) for the law's `own` ones (n,)."""
+        own = np.asarray(own, dtype=float)
+        return own * self.ratio if self.value is None else np.array(np.broadcast_to(self.value, own.shape))
+
+
+class ShapedStiffness(_Shaped):
+    """K_e."""
+
+    value: Annotated[float | Vector, Quantity("N m/rad", ((), (None,)), above=0)] | None = Field(
+        default=None, description="one number for all joints, or one each, N m/rad"
+    )
+
+
+class ShapedInertia(_Shaped):
+    """B_e."""
+
+    value: Annotated[float | Vector, Quantity("kg m^2", ((), (None,)), above=0)] | None = Field(
+        default=None, description="one number for all joints, or one each, kg m^2"
+    )
+
+
+class _Gains(Section):
+    """A symmetric positive definite matrix of the task, by its blocks or as a whole."""
+
+    alternative: ClassVar[str | None] = None
+    translation: Matrix | None = Field(default=None, description="translational block")
+    rotation: Matrix | None = Field(default=None, description="rotational block; with task pose only")
+    matrix: _FULL | None = Field(
+        default=None, description="the whole matrix in SI units: 6×6, or 3×3 for task position"
+    )
+
+    @model_validator(mode="after")
+    def _one_way(self) -> Self:
+        ways = [w for w in ("translation", "matrix", self.alternative) if w]
+        given = [w for w in ways if getattr(self, w) is not None]
+        if len(given) != 1:
+            raise ValueError(
+                f"needs exactly one of {', '.join(ways)}; got {' and '.join(given) or 'none of them'}"
+            )
+        if self.rotation is not None and given != ["translation"]:
+            raise Mistakes((("rotation",), "goes with translation only; remove it"))
+        return self
+
+    def require(self, task: str) -> None:
+        """Raise Mistakes unless the size is that of the task."""
+        size = 3 if task == "position" else 6
+        if self.matrix is not None and len(self.matrix) != size:
+            got = len(self.matrix)
+            raise Mistakes(
+                (("matrix",), f"a {task} task needs {size}×{size} numbers in SI units; got {got}×{got}")
+            )
+        if task == "position" and self.rotation is not None:
+            raise Mistakes((("rotation",), "a position task has no rotation; remove it, or take task: pose"))
+        if task == "pose" and self.translation is not None and self.rotation is None:
+            raise Mistakes((("rotation",), "missing; a pose task needs it, a position task does not"))
+
+    def full(self) -> NDArray[np.float64]:
+        """Return the matrix (6, 6), or (3, 3) for a position task; not for gains given by a ratio."""
+        if self.matrix is not None:
+            return np.array(self.matrix)
+        if self.translation is None:
+            raise ValueRangeError("gains given by a ratio have no matrix", needs="the inertia of a posture")
+        if self.rotation is None:
+            return np.array(self.translation)
+        zero = np.zeros((3, 3))
+        return np.block([[np.array(self.translation), zero], [zero, np.array(self.rotation)]])
+
+
+class Stiffness(_Gains):
+    """K_x."""
+
+    translation: Annotated[Matrix, _three("N/m"), _BLOCK] | None = Field(
+        default=None, description="one number, 3 numbers or 3×3, N/m"
+    )
+    rotation: Annotated[Matrix, _three("N m/rad"), _BLOCK] | None = Field(
+        default=None, description="one number, 3 numbers or 3×3, N m/rad; with task pose only"
+    )
+
+
+class Damping(_Gains):
+    """D_x."""
+
+    alternative: ClassVar[str | None] = "ratio"
+    translation: Annotated[Matrix, _three("N s/m"), _BLOCK] | None = Field(
+        default=None, description="one number, 3 numbers or 3×3, N s/m"
+    )
+    rotation: Annotated[Matrix, _three("N m s/rad"), _BLOCK] | None = Field(
+        default=None, description="one number, 3 numbers or 3×3, N m s/rad; with task pose only"
+    )
+    ratio: Positive | None = Field(
+        default=None, description="damping ratio of every mode at the start posture"
+    )
+
+
+class TargetInertia(_Gains):
+    """M_x."""
+
+    alternative: ClassVar[str | None] = "damping_ratio"
+    translation: Annotated[Matrix, _three("kg"), _BLOCK] | None = Field(
+        default=None, description="one number, 3 numbers or 3×3, kg"
+    )
+    rotation: Annotated[Matrix, _three("kg m^2"), _BLOCK] | None = Field(
+        default=None, description="one number, 3 numbers or 3×3, kg m^2; with task pose only"
+    )
+    damping_ratio: Positive | None = Field(
+        default=None, description="the inertia that gives every mode this damping ratio"
+    )
+
+
+class _LawSettings(Section):
+    """What both laws have."""
+
+    task: Literal["pose", "position"] = Field(description="all six directions, or position only")
+    stiffness: Stiffness = Field(description="stiffness K_x of the Cartesian spring")
+    damping: Damping = Field(description="damping D_x")
+    null_space_damping: Annotated[float, Quantity("1/s", least=0)] = Field(
+        default=0.0, description="damping k_ns of the self-motion, 1/s"
+    )
+    regularisation: Annotated[float, Quantity("1/kg", least=0)] = Field(
+        default=1e-9, description="ε of Λ = (J M⁻¹ Jᵀ + ε I)⁻¹, 1/kg"
+    )
+
+    @field_validator("stiffness", "damping", "target_inertia", check_fields=False)
+    @classmethod
+    def _sized(cls, gains: _Gains, info: ValidationInfo) -> _Gains:
+        if "task" in info.data:
+            gains.require(info.data["task"])
+        return gains
+
+
+class ImpedanceSettings(_LawSettings):
+    """The paper's law."""
+
+    type: Literal["impedance"] = Field(description="the law: impedance (the paper's) or rigid (the baseline)")
+    gravity: Literal["robot", "motor", "static"] = Field(
+        default="static",
+        description="who carries the weight: the robot itself, ∇V(φ), or ∇V(q̄), which is exact",
+    )
+    shaped_stiffness: ShapedStiffness = Field(
+        description="K_e: {ratio: multiple of K}, or a quantity in N m/rad"
+    )
+    shaped_inertia: ShapedInertia = Field(description="B_e: {ratio: multiple of B}, or a quantity in kg m^2")
+
+
+class RigidSettings(_LawSettings):
+    """The baseline: cancels the dynamics as if the joints were rigid."""
+
+    type: Literal["rigid"] = Field(description="the law: impedance (the paper's) or rigid (the baseline)")
+    gravity: Literal["robot", "model"] = Field(
+        default="model", description="who carries the weight: the robot itself, or the law by its model"
+    )
+    target_inertia: TargetInertia = Field(description="inertia M_x that the end effector is to have")
+    motor_inertia: Literal["ignored", "carried"] = Field(
+        default="ignored", description="whether the law adds the motor inertia to that of the links"
+    )

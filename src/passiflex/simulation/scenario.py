@@ -1,0 +1,256 @@
+"""What one simulation is: robot, law, tank, reference, forces, model errors, noise; in SI units."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal, Self
+
+import yaml
+from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
+
+from passiflex.simulation.law_settings import ImpedanceSettings, RigidSettings
+from passiflex.simulation.quantity import Quantity, shown
+from passiflex.simulation.section import Mistakes, Section
+
+Vector = tuple[float, ...]
+Seconds = Annotated[float, Quantity("s", above=0)]
+Instant = Annotated[float, Quantity("s", least=0)]
+Energy = Annotated[float, Quantity("J", least=0)]
+Length = Annotated[Vector, Quantity("m", ((3,),))]
+Turn = Annotated[Vector, Quantity("rad", ((3,),))]
+RelativeError = Annotated[float, Quantity("1", above=-1)]
+ZERO = (0.0, 0.0, 0.0)
+
+
+class Tool(Section):
+    """Where the end effector is, seen from the robot's own."""
+
+    position: Length = Field(
+        default=ZERO, description="offset of the end effector, in the axes of the robot's own, m"
+    )
+    rotation_vector: Turn = Field(default=ZERO, description="turn of the end effector's axes, rad")
+
+
+class TankSettings(Section):
+    """The energy tank that pays for the motion of the reference."""
+
+    initial: Energy = Field(default=2.0, description="energy at the start, J")
+    fill: Annotated[float, Quantity("1", least=0, most=1)] = Field(
+        default=1.0, description="share α of the dissipated power that fills the tank, 0 to 1"
+    )
+    floor: Energy = Field(default=0.01, description="level that the reference never draws below, J")
+    low: Energy = Field(default=0.05, description="level below which the reference slows down, J")
+    cap: Annotated[float, Quantity("J", least=0, finite=False)] = Field(
+        default=float("inf"), description="level above which energy is spilled, J; inf for none"
+    )
+    band: Annotated[float, Quantity("J", above=0)] = Field(
+        default=0.05, description="width below the cap over which the inflow fades out, J"
+    )
+    accounting: Literal["paper", "signed"] = Field(
+        default="paper", description="a moving reference draws |P_X| (paper) or P_X (signed)"
+    )
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        found: list[tuple[tuple[str | int, ...], str]] = []
+        if not self.initial > self.floor:
+            what = f"a tank started empty never moves the reference; got {self.initial:g} J"
+            found.append((("initial",), f"{what}; needs more than the floor of {self.floor:g} J"))
+        if not self.low > self.floor:
+            found.append((("low",), f"needs more than the floor of {self.floor:g} J; got {self.low:g} J"))
+        if not self.cap - self.band > self.low:
+            found.append(
+                (("cap",), f"needs more than low + band, {self.low + self.band:g} J; got {self.cap:g} J")
+            )
+        if found:
+            raise Mistakes(*found)
+        return self
+
+
+class Step(Section):
+    """The reference jumps."""
+
+    at: Instant = Field(description="when it begins, s")
+    kind: Literal["step"] = Field(description="step, move, circle or hold")
+    by: Length = Field(description="displacement in world axes, m")
+    turn: Turn = Field(default=ZERO, description="rotation vector of the turn in world axes, rad")
+
+
+class Move(Section):
+    """The reference moves with minimum jerk."""
+
+    at: Instant = Field(description="when it begins, s")
+    kind: Literal["move"] = Field(description="step, move, circle or hold")
+    by: Length = Field(description="displacement in world axes, m")
+    duration: Seconds = Field(description="how long the move takes, s")
+
+
+def _axes(written: Any) -> tuple[str, str]:
+    """Return two different axes, as lower-case letters."""
+    axes = [str(a).lower() for a in written] if isinstance(written, list | tuple) else []
+    if len(axes) != 2 or not set(axes) <= set("xyz") or axes[0] == axes[1]:
+        raise ValueError(f"expected two different axes of x, y, z; got {shown(written)}")
+    return axes[0], axes[1]
+
+
+class Circle(Section):
+    """The reference goes round a circle, from where it is and in the direction of the plane's first axis."""
+
+    at: Instant = Field(description="when it begins, s")
+    kind: Literal["circle"] = Field(description="step, move, circle or hold")
+    plane: Annotated[tuple[Literal["x", "y", "z"], Literal["x", "y", "z"]], BeforeValidator(_axes)] = Field(
+        description="list of two world axes, as [y, z]: the direction of the start, and towards the centre"
+    )
+    radius: Annotated[float, Quantity("m", above=0)] = Field(description="radius, m")
+    period: Seconds = Field(description="time of one turn, s")
+
+
+class Hold(Section):
+    """The reference stops."""
+
+    at: Instant = Field(description="when it begins, s")
+    kind: Literal["hold"] = Field(description="step, move, circle or hold")
+
+
+ReferenceEvent = Annotated[Step | Move | Circle | Hold, Field(discriminator="kind")]
+
+
+class Force(Section):
+    """A constant wrench on the end effector for some time; wrenches that overlap add up."""
+
+    start: Instant = Field(alias="from", description="when it begins, s")
+    end: Instant = Field(alias="to", description="when it ends, s")
+    force: Annotated[Vector, Quantity("N", ((3,),))] = Field(
+        default=ZERO, description="force in world axes, N"
+    )
+    moment: Annotated[Vector, Quantity("N m", ((3,),))] = Field(
+        default=ZERO, description="moment in world axes, N m"
+    )
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        if not self.end > self.start:
+            raise Mistakes((("to",), f"needs to be later than from = {self.start:g} s; got {self.end:g} s"))
+        return self
+
+
+class ModelErrors(Section):
+    """By how much the law's model is wrong, relative to the robot: 50 % means 1.5 times the truth."""
+
+    joint_stiffness: RelativeError = Field(default=0.0, description="relative error of K, > -100 %")
+    joint_damping: RelativeError = Field(default=0.0, description="relative error of D, > -100 %")
+    motor_inertia: RelativeError = Field(default=0.0, description="relative error of B, > -100 %")
+    link_inertia: RelativeError = Field(
+        default=0.0, description="relative error of the links' masses and inertias, > -100 %"
+    )
+
+
+class Noise(Section):
+    """White noise on the measured joint torque, held between samples."""
+
+    torque_variance: Annotated[float, Quantity("(N m)^2", least=0)] = Field(
+        description="variance per joint, (N m)^2"
+    )
+    hold: Seconds = Field(default=0.001, description="time between two samples, s")
+
+
+def _own_tank(data: dict[str, Any]) -> TankSettings | None:
+    return TankSettings() if isinstance(data.get("law"), ImpedanceSettings) else None
+
+
+class Scenario(Section):
+    """One simulation, complete: with the package's version it gives the same result again."""
+
+    name: str = Field(
+        pattern=r"^[A-Za-z0-9_.-]+$",
+        max_length=100,
+        description="name of the run: letters, digits, and any of _ . -",
+    )
+    description: str = Field(default="", description="what it shows")
+    robot: str = Field(min_length=1, description="name in the catalogue, or path of a robot file (.yaml)")
+    tool: Tool = Field(default=Tool(), description="end effector, seen from the robot's own")
+    posture: Annotated[Vector, Quantity("rad", ((None,),))] = Field(
+        description="joint angles at the start, at rest, rad"
+    )
+    law: Annotated[ImpedanceSettings | RigidSettings, Field(discriminator="type")] = Field(
+        description="control law"
+    )
+    tank: TankSettings | None = Field(
+        default_factory=_own_tank, description="energy tank; with the impedance law only"
+    )
+    duration: Seconds = Field(description="simulated time, s")
+    reference: tuple[ReferenceEvent, ...] = Field(
+        default=(), description="what the reference does, in the order of time"
+    )
+    forces: tuple[Force, ...] = Field(default=(), description="external forces on the end effector")
+    model_errors: ModelErrors = Field(default=ModelErrors(), description="errors of the law's model")
+    noise: Noise | None = Field(
+        default=None,
+        description="noise on the measured joint torque, which the rigid law does not use; none if left out",
+    )
+    output_interval: Seconds = Field(
+        default=0.005,
+        validate_default=True,
+        description="time between two rows of the result, s; with noise a whole multiple of noise.hold",
+    )
+    tolerance: Annotated[float, Quantity("1", least=1e-13, most=1e-3)] = Field(
+        default=1e-9, description="relative tolerance of the integrator"
+    )
+    seed: int = Field(default=0, ge=0, strict=True, description="seed of the noise")
+
+    @field_validator("tank")
+    @classmethod
+    def _tank_of_the_law(cls, tank: TankSettings | None, info: ValidationInfo) -> TankSettings | None:
+        if isinstance(info.data.get("law"), RigidSettings) and tank is not None:
+            raise ValueError("only the impedance law has a tank; remove it, or take law type: impedance")
+        return tank
+
+    @field_validator("reference")
+    @classmethod
+    def _in_order(cls, events: tuple[Any, ...], info: ValidationInfo) -> tuple[Any, ...]:
+        found: list[tuple[tuple[str | int, ...], str]] = []
+        end = info.data.get("duration", float("inf"))
+        positions = "law" in info.data and info.data["law"].task == "position"
+        for i, event in enumerate(events):
+            got = f"got {event.at:g} s"
+            if i and not event.at > events[i - 1].at:
+                found.append(
+                    ((i, "at"), f"needs to be later than the one before, {events[i - 1].at:g} s; {got}")
+                )
+            if not event.at < end:
+                found.append(((i, "at"), f"needs to be earlier than the end, {end:g} s; {got}"))
+            if positions and getattr(event, "turn", ZERO) != ZERO:
+                found.append(((i, "turn"), "a position task has no orientation; remove it"))
+        if found:
+            raise Mistakes(*found)
+        return events
+
+    @field_validator("forces")
+    @classmethod
+    def _within_the_run(cls, forces: tuple[Force, ...], info: ValidationInfo) -> tuple[Force, ...]:
+        end = info.data.get("duration", float("inf"))
+        needs = f"needs to be earlier than the end, {end:g} s"
+        late = [
+            ((i, "from"), f"{needs}; got {f.start:g} s") for i, f in enumerate(forces) if not f.start < end
+        ]
+        if late:
+            raise Mistakes(*late)
+        return forces
+
+    @field_validator("output_interval")
+    @classmethod
+    def _whole_samples(cls, interval: float, info: ValidationInfo) -> float:
+        if interval > info.data.get("duration", float("inf")):
+            needs = f"needs to be no longer than the duration, {info.data['duration']:g} s"
+            raise ValueError(f"{needs}; got {interval:g} s")
+        noise = info.data.get("noise")
+        if noise is None:
+            return interval
+        samples = interval / noise.hold
+        if not 0.5 < samples < 1e9 or abs(samples - round(samples)) > 1e-9 * samples:
+            raise ValueError(f"needs a whole multiple of noise.hold, {noise.hold:g} s; got {interval:g} s")
+        return interval
+
+    def to_yaml(self) -> str:
+        """Return the text of a file that loads to an equal scenario: complete and in SI units."""
+        data = self.model_dump(by_alias=True, exclude_none=True)
+        return yaml.safe_dump(data, sort_keys=False, allow_unicode=True, default_flow_style=None, width=110)

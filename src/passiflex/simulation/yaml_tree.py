@@ -1,0 +1,149 @@
+"""YAML text as plain Python values that remember their line and column."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from typing import Any, NamedTuple
+
+import yaml
+
+from passiflex.simulation.quantity import shown
+
+MAX_NODES = 100_000
+MAX_DEPTH = 30
+
+Place = tuple[str | int, ...]
+"""Where a value is: the names and indices that lead to it."""
+
+_INT = re.compile(r"[-+]?(?:0|[1-9][0-9]{0,17})")
+_FLOAT = re.compile(r"[-+]?[0-9]+\.[0-9]*(?:[eE][-+][0-9]+)?|[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN)")
+_WORDS = {
+    **dict.fromkeys(("true", "True", "TRUE"), True),
+    **dict.fromkeys(("false", "False", "FALSE"), False),
+    **dict.fromkeys(("", "~", "null", "Null", "NULL")),
+}
+_SURROGATE = re.compile("[\ud800-\udfff]")
+_STANDARD_TAGS = {f"tag:yaml.org,2002:{kind}" for kind in ("str", "seq", "map")}
+
+
+class Mark(NamedTuple):
+    """A place in a file, counted from 1."""
+
+    line: int
+    column: int
+
+
+class RefusedText(Exception):  # noqa: N818 - becomes a ScenarioError
+    """The text is no tree of mappings, lists and scalars of bearable size."""
+
+
+class Tree:
+    """A YAML text as Python values, with the mark of every key and value, and the mistakes found so far."""
+
+    def __init__(self) -> None:
+        self.keys: dict[Place, Mark] = {}
+        self.values: dict[Place, Mark] = {}
+        self.mistakes: list[tuple[Mark, str, str]] = []
+
+    def read(self, text: str) -> dict[str, Any]:
+        """Return the mapping of the text; raise RefusedText where there is none."""
+        try:
+            node = yaml.compose(text, yaml.BaseLoader)
+        except yaml.reader.ReaderError as error:
+            before = text[: error.position]
+            line, column = before.count("\n") + 1, len(before) - before.rfind("\n")
+            raise RefusedText(f"line {line}, column {column}: a character that YAML does not allow") from None
+        except yaml.MarkedYAMLError as error:
+            problem = error.problem_mark or error.context_mark
+            at = f"line {problem.line + 1}, column {problem.column + 1}: " if problem else ""
+            what = ", ".join(p for p in (error.context, error.problem) if p)
+            raise RefusedText(f"{at}no YAML: {_one_line(what)}") from None
+        except RecursionError:
+            raise RefusedText("nested too deeply") from None
+        except (yaml.YAMLError, ValueError, OverflowError) as error:
+            raise RefusedText(f"no YAML: {_one_line(str(error))}") from None
+        if node is None:
+            raise RefusedText("empty; a scenario needs at least name, robot, posture, law and duration")
+        if not isinstance(node, yaml.MappingNode):
+            mark = _mark(node)
+            raise RefusedText(f"line {mark.line}, column {mark.column}: not a mapping; try 'name: ...'")
+        return self._value(node, ())
+
+    def report(self, place: Place, message: str, *, at_key: bool = False, mark: Mark | None = None) -> None:
+        """Add a mistake at a key or value, or at the nearest thing around it that the file has."""
+        for end in range(len(place), -1, -1):
+            known = (self.keys if at_key and end == len(place) else self.values).get(place[:end])
+            mark = mark or known
+        self.mistakes.append((mark or Mark(1, 1), f", {dotted(place)}" if place else "", message))
+
+    def lines(self) -> list[str]:
+        """Return the mistakes, one line each, in the order of the file."""
+        found = [f"line {m.line}, column {m.column}{name}: {text}" for m, name, text in sorted(self.mistakes)]
+        return list(dict.fromkeys(found))
+
+    def _value(self, node: yaml.Node, place: Place) -> Any:
+        mark = _mark(node)
+        self.values[place] = mark
+        if len(self.values) > MAX_NODES:
+            raise RefusedText(f"more than {MAX_NODES} entries, aliases counted as often as they are used")
+        if len(place) > MAX_DEPTH:
+            raise RefusedText(f"line {mark.line}, column {mark.column}: nested too deeply")
+        if node.tag not in _STANDARD_TAGS:
+            self.report(place, f"the tag {shown(node.tag)} is not supported; remove it")
+        if isinstance(node, yaml.SequenceNode):
+            return [self._value(child, (*place, i)) for i, child in enumerate(node.value)]
+        if isinstance(node, yaml.MappingNode):
+            return self._mapping(node, place)
+        if _SURROGATE.search(node.value):
+            raise RefusedText(f"line {mark.line}, column {mark.column}: a character that is not Unicode text")
+        plain = isinstance(node, yaml.ScalarNode) and node.style is None
+        return _scalar(node.value) if plain and node.tag in _STANDARD_TAGS else node.value
+
+    def _mapping(self, node: yaml.MappingNode, place: Place) -> dict[str, Any]:
+        out: dict[str, Any] = {}
+        for key, child in node.value:
+            if not isinstance(key, yaml.ScalarNode) or _SURROGATE.search(key.value):
+                self.report(place, "a name is not plain text", mark=_mark(key))
+                continue
+            here = (*place, key.value)
+            if key.value in out:
+                message = f"twice in one mapping, first in line {self.keys[here].line}; remove one"
+                self.report(here, message, mark=_mark(key))
+                continue
+            self.keys[here] = _mark(key)
+            out[key.value] = self._value(child, here)
+        return out
+
+
+def _one_line(text: str) -> str:
+    return "".join(c if c.isprintable() else " " for c in text)[:200]
+
+
+def _mark(node: yaml.Node) -> Mark:
+    return Mark(node.start_mark.line + 1, node.start_mark.column + 1)
+
+
+def _scalar(text: str) -> Any:
+    """Return the value of a plain scalar. YAML 1.1 reads 010 as 8, 1:30 as 90 and `on` as true: not here.
+
+    What is left out here, as 1e-9, stays text, which quantities read as well.
+    """
+    if text in _WORDS:
+        return _WORDS[text]
+    if _INT.fullmatch(text):
+        return int(text)
+    if _FLOAT.fullmatch(text):
+        return float(text.lower().replace(".inf", "inf").replace(".nan", "nan"))
+    return text
+
+
+def dotted(place: Iterable[str | int]) -> str:
+    """Return a place as `law.stiffness.translation` or `reference[0].by`."""
+    out = ""
+    for part in place:
+        if isinstance(part, int):
+            out += f"[{part}]"
+        else:
+            out += ("." if out else "") + (part if re.fullmatch(r"[\w-]{1,40}", part) else shown(part))
+    return out
