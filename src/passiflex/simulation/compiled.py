@@ -1,0 +1,58 @@
+"""A closed loop in native code, built once per structure and shared within the process."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import casadi as cs
+
+from passiflex.control.gravity import AbstractGravity
+from passiflex.control.law import AbstractLaw
+from passiflex.control.task import AbstractTask
+from passiflex.native import DRIVER, FixedStep, NativeFunction, compile_functions, load_external
+from passiflex.simulation.closed_loop import ClosedLoop
+
+CVODES_DERIVATIVES = {"fd_method": "forward", "is_diff_in": [True, False, False]}
+"""CVODES needs ∂ẋ/∂x only, and one-sided differences are enough for its Newton iteration."""
+
+_built: dict[tuple[str, type[AbstractLaw], AbstractTask, AbstractGravity], CompiledLoop] = {}
+
+
+@dataclass(frozen=True, eq=False)
+class CompiledLoop:
+    """A closed loop and its compiled functions; all numbers are run-time inputs.
+
+    Attributes
+    ----------
+    loop: The symbolic closed loop.
+    rhs: (x, u, p) → (ẋ, powers), as a CasADi function for CVODES.
+    fixed_step: The same, under held inputs.
+    outputs: (x, u, p) → recorded signals.
+    law: The control law alone.
+    """
+
+    loop: ClosedLoop
+    rhs: cs.Function
+    fixed_step: FixedStep
+    outputs: NativeFunction
+    law: NativeFunction
+
+
+def compiled_loop(law: AbstractLaw) -> CompiledLoop:
+    """Return the compiled closed loop of a law; from the process, the cache on disk, or compiled now."""
+    # The laws are final: their type, task and gravity choice are all that their code depends on.
+    key = (law.robot.arm.chain.to_urdf(), type(law), law.task, law.gravity)
+    if key not in _built:
+        _built[key] = _compile(ClosedLoop(law))
+    return _built[key]
+
+
+def _compile(loop: ClosedLoop) -> CompiledLoop:
+    library = compile_functions([loop.rhs, loop.outputs, loop.law_function], driver=DRIVER)
+    return CompiledLoop(
+        loop=loop,
+        rhs=load_external("rhs", library, **CVODES_DERIVATIVES) if library else loop.rhs,
+        fixed_step=FixedStep(loop.rhs, library),
+        outputs=NativeFunction(loop.outputs, library),
+        law=NativeFunction(loop.law_function, library),
+    )

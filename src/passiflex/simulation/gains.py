@@ -1,0 +1,123 @@
+"""From the settings of a law to its gains: ratios become numbers, for the law's own model."""
+
+from __future__ import annotations
+
+import casadi as cs
+import numpy as np
+from numpy.typing import NDArray
+
+from passiflex.control.damping_design import damping_from_ratio
+from passiflex.control.law import AbstractLaw
+from passiflex.control.null_space import inverse_cartesian_inertia
+from passiflex.control.tank import NO_CAP, EnergyTank
+from passiflex.errors import SizeError
+from passiflex.robots.flexible import FlexibleJointRobot
+from passiflex.simulation.law_settings import ImpedanceSettings, RigidSettings, ShapedInertia, ShapedStiffness
+from passiflex.simulation.posture import Posture
+from passiflex.simulation.problem import TankStart
+from passiflex.simulation.scenario import Scenario
+
+Array = NDArray[np.float64]
+
+
+def law_gains(
+    scenario: Scenario, law: AbstractLaw, model: dict[str, Array], start: Posture
+) -> dict[str, Array]:
+    """Return the numbers of `law.layout`, with the law's model and the start posture as that model sees it."""
+    s, robot = scenario.law, law.robot
+    stiffness = s.stiffness.full()
+    world = in_world(stiffness, start.pose.rotation)
+    gains: dict[str, Array] = {
+        "stiffness": stiffness,
+        "null_space_damping": np.asarray(s.null_space_damping),
+        "regularisation": np.asarray(s.regularisation),
+    }
+    if isinstance(s, ImpedanceSettings):
+        gains["shaped_stiffness"] = _sized(
+            "shaped_stiffness", s.shaped_stiffness, model["joint_stiffness"], robot
+        )
+        gains["shaped_inertia"] = _sized("shaped_inertia", s.shaped_inertia, model["motor_inertia"], robot)
+        gains["damping"] = _damping(s, world, _natural_inertia(law.task.size, start, s.regularisation))
+        return gains
+    carried = model["motor_inertia"] if s.motor_inertia == "carried" else np.zeros(robot.n)
+    if s.target_inertia.damping_ratio is not None:
+        target = target_inertia(world, s.damping.full(), s.target_inertia.damping_ratio)
+    else:
+        target = s.target_inertia.full()
+    return gains | {
+        "target_inertia": target,
+        "damping": _damping(s, world, target),
+        "carried_inertia": carried,
+    }
+
+
+def in_world(stiffness: Array, rotation: Array) -> Array:
+    """Return K_x with its rotational block, which is in the axes of the reference, turned into world axes."""
+    turn = np.eye(len(stiffness))
+    if len(stiffness) == 6:
+        turn[3:, 3:] = rotation
+    return _symmetric(turn @ stiffness @ turn.T)
+
+
+def target_inertia(stiffness: Array, damping: Array, ratio: float) -> Array:
+    """Return M_x = D K⁻¹ D / (4 ζ²), for which D is the damping ratio ζ in every mode (theory note 2.8).
+
+    For one axis it is m = (D / 2ζ)² / K.
+    """
+    return _symmetric(damping @ np.linalg.solve(stiffness, damping) / (4 * ratio**2))
+
+
+def _sized(
+    name: str, setting: ShapedStiffness | ShapedInertia, own: Array, robot: FlexibleJointRobot
+) -> Array:
+    try:
+        return setting.resolve(own)
+    except ValueError as error:
+        raise SizeError(
+            f"law.{name} does not fit robot {robot.name!r}",
+            got=f"{np.size(setting.value or ())} numbers",
+            needs=f"one number or {robot.n}",
+        ) from error
+
+
+def _damping(s: ImpedanceSettings | RigidSettings, stiffness: Array, inertia: Array) -> Array:
+    return (
+        s.damping.full()
+        if s.damping.ratio is None
+        else damping_from_ratio(stiffness, inertia, s.damping.ratio)
+    )
+
+
+def _natural_inertia(size: int, start: Posture, regularisation: float) -> Array:
+    mobility = inverse_cartesian_inertia(
+        cs.SX(start.mass_matrix), cs.SX(start.jacobian[:size]), regularisation
+    )
+    return _symmetric(np.linalg.inv(np.array(cs.DM(mobility))))
+
+
+def _symmetric(matrix: Array) -> Array:
+    return (matrix + matrix.T) / 2
+
+
+def tank_start(scenario: Scenario) -> TankStart:
+    """Return the tank at the start; an empty one for a law without a tank."""
+    t = scenario.tank
+    return TankStart(t.initial, t.floor, t.cap, t.accounting == "signed") if t else TankStart(0, 0, 0, False)
+
+
+def tank_gains(scenario: Scenario) -> Array:
+    """Return the flat numbers of `EnergyTank.layout`."""
+    t = scenario.tank
+    values = (
+        {
+            "fill": t.fill,
+            "floor": t.floor,
+            "low": t.low,
+            "cap": min(t.cap, NO_CAP),
+            "band": t.band,
+            "signed": t.accounting == "signed",
+        }
+        if t
+        else {"fill": 0, "floor": 0, "low": 1, "cap": NO_CAP, "band": 1, "signed": 0}
+    )
+    return EnergyTank().layout.pack({f"tank_{name}": float(value) for name, value in values.items()})

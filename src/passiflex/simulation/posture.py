@@ -1,0 +1,65 @@
+"""The arm at one posture, in numbers."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import NamedTuple
+
+import casadi as cs
+import numpy as np
+from numpy.typing import NDArray
+
+from passiflex.errors import ValueRangeError
+from passiflex.robots.arm import SerialArm
+from passiflex.robots.flexible import FlexibleJointRobot
+from passiflex.simulation.motion import Pose
+from passiflex.simulation.problem import Problem
+
+Array = NDArray[np.float64]
+
+SINGULAR = 1e-6
+"""A posture is singular if the smallest singular value of the task's Jacobian is below this share of the largest."""
+
+
+class Posture(NamedTuple):
+    """The arm at one posture, in numbers."""
+
+    pose: Pose
+    jacobian: Array
+    mass_matrix: Array
+    gravity_torque: Array
+
+
+def posture(robot: FlexibleJointRobot, q: Array, parameters: dict[str, Array]) -> Posture:
+    """Return pose, Jacobian, M and ∇V at q (n,) for the numbers of `robot.layout`."""
+    numbers = robot.arm.layout.pack({f.name: parameters[f.name] for f in robot.arm.layout})
+    p, R, J, M, gravity = (np.array(v) for v in _posture_function(robot.arm)(q, numbers))
+    return Posture(Pose(p.ravel(), R), J, M, gravity.ravel())
+
+
+def natural_inertia(problem: Problem) -> Array:
+    """Return Λ of (31) at the start, with the numbers of the plant; (k, k) for the size k of the task.
+
+    Raises
+    ------
+    ValueRangeError
+        If the posture is singular, where Λ is infinite.
+    """
+    robot = problem.law.robot
+    start = posture(robot, problem.q, robot.layout.unpack(problem.plant))
+    J = start.jacobian[: problem.law.task.size]
+    mobility = J @ np.linalg.solve(start.mass_matrix, J.T)
+    if not np.linalg.cond(mobility) < 1 / SINGULAR**2:
+        raise ValueRangeError(
+            "posture is singular, where Λ is infinite", got=problem.q, try_="another posture"
+        )
+    inertia = np.linalg.inv(mobility)
+    return (inertia + inertia.T) / 2
+
+
+@lru_cache(maxsize=16)
+def _posture_function(arm: SerialArm) -> cs.Function:
+    q = cs.SX.sym("q", arm.n)
+    vector, m = arm.layout.symbols("m")
+    outputs = [*arm.pose(q, m), arm.jacobian(q, m), arm.mass_matrix(q, m), arm.gravity_torque(q, m)]
+    return cs.Function("posture", [q, vector], outputs, {"cse": True})

@@ -1,0 +1,77 @@
+"""What a simulation needs, in numbers: structure, parameters, start, events."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from passiflex.control.law import AbstractLaw
+from passiflex.simulation.motion import Motion, Pose
+
+Array = NDArray[np.float64]
+
+
+class Event(NamedTuple):
+    """From `time` on, another motion of the reference (None: the same goes on) and this wrench F_e (6,)."""
+
+    time: float
+    motion: Motion | None
+    F_e: Array
+
+
+class Noise(NamedTuple):
+    """White noise on the measured τ_a: variance [(N m)²], held for `hold` seconds each."""
+
+    variance: float
+    hold: float
+
+
+class TankStart(NamedTuple):
+    """The tank at the start [J], its floor and cap, and whether a jump is charged with its sign."""
+
+    initial: float
+    floor: float
+    cap: float
+    signed: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """A closed loop with all its numbers.
+
+    Attributes
+    ----------
+    law: Structure of the law, with its robot.
+    plant, model, gains, tank_gains: Flat parameter vectors, in the order of `ClosedLoop.parameters`.
+    q, theta: Start, at rest, (n,) rad.
+    home: Pose that the reference holds at the start.
+    events: By time; the first at time 0.
+    duration, output_interval: [s].
+    configuration: The resolved scenario as text; it is stored beside the result.
+    """
+
+    name: str
+    law: AbstractLaw
+    plant: Array
+    model: Array
+    gains: Array
+    tank_gains: Array
+    q: Array
+    theta: Array
+    home: Pose
+    tank: TankStart
+    events: tuple[Event, ...]
+    noise: Noise | None
+    duration: float
+    output_interval: float
+    tolerance: float
+    seed: int
+    configuration: str
+
+    @property
+    def parameters(self) -> Array:
+        """Return the flat parameter vector of the compiled closed loop."""
+        return np.concatenate([self.plant, self.model, self.gains, self.tank_gains])

@@ -1,0 +1,174 @@
+"""From a scenario to numbers: load the robot, build the law, place the start, lay out the events."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from passiflex.control.gravity import AbstractGravity, MotorGravity, RobotGravity, StaticGravity
+from passiflex.control.law import AbstractLaw, ImpedanceLaw
+from passiflex.control.rigid import RigidImpedanceLaw
+from passiflex.control.task import AbstractTask, PoseTask, PositionTask
+from passiflex.errors import SizeError, ValueRangeError
+from passiflex.robots.flexible import FlexibleJointRobot
+from passiflex.simulation.gains import law_gains, tank_gains, tank_start
+from passiflex.simulation.law_settings import RigidSettings
+from passiflex.simulation.posture import SINGULAR, posture
+from passiflex.simulation.problem import Noise, Problem
+from passiflex.simulation.scenario import Scenario
+from passiflex.simulation.scenario_file import parse_scenario
+from passiflex.simulation.timeline import timeline
+
+Array = NDArray[np.float64]
+
+STANDARD_GRAVITY = (0.0, 0.0, -9.81)
+TASKS: dict[str, AbstractTask] = {"pose": PoseTask(), "position": PositionTask()}
+GRAVITIES: dict[str, AbstractGravity] = {
+    "robot": RobotGravity(),
+    "motor": MotorGravity(),
+    "static": StaticGravity(),
+    "model": StaticGravity(),  # the rigid law cancels by its model; its plant has gravity
+}
+SLOWEST_CONTRACTION = 0.1
+"""Largest |∇²V| / K_e for the static compensation: its eight steps then reach 1e-8 of the weight."""
+REGULAR = 1e-6
+"""Regularisation [1/kg] from which a law may start in a singular posture; the default only guards round-off."""
+
+
+def resolve(scenario: Scenario, robot: FlexibleJointRobot | None = None) -> Problem:
+    """Return the problem that a scenario describes, with another robot in place of its own if one is given.
+
+    Raises
+    ------
+    PassiflexError
+        If the robot cannot be loaded, a size does not fit it, a start is outside the robot's limits or singular.
+    """
+    scenario = parse_scenario(
+        scenario.to_yaml(), source=f"scenario {scenario.name!r}"
+    )  # it may be a changed copy
+    if robot is None:
+        robot = FlexibleJointRobot.load(scenario.robot)
+    else:  # what is stored beside the result must not pass for the scenario's own robot
+        scenario = scenario.model_copy(update={"robot": f"{robot.name}, changed in memory"})
+    law = _law(scenario, robot)
+    q = _start(scenario, robot)
+    plant = robot.nominal(STANDARD_GRAVITY if law.gravity.in_model else (0.0, 0.0, 0.0))
+    plant |= _tool(scenario, plant)
+    model = _with_errors(scenario, plant)
+    at_start = posture(robot, q, plant)
+    _refuse_singular(scenario, at_start.jacobian[: law.task.size])
+    gains = law_gains(scenario, law, model, posture(robot, q, model))
+    if isinstance(law.gravity, StaticGravity) and "shaped_stiffness" in gains:
+        _refuse_soft(robot, q, model, gains["shaped_stiffness"])
+    theta = q + at_start.gravity_torque / plant["joint_stiffness"]
+    shaped = q + model["joint_stiffness"] / gains.get("shaped_stiffness", model["joint_stiffness"]) * (
+        theta - q
+    )
+    home = posture(robot, shaped, model).pose
+    return Problem(
+        name=scenario.name,
+        law=law,
+        plant=robot.layout.pack(plant),
+        model=robot.layout.pack(model),
+        gains=law.layout.pack(gains),
+        tank_gains=tank_gains(scenario),
+        q=q,
+        theta=theta,
+        home=home,
+        tank=tank_start(scenario),
+        events=timeline(scenario, home),
+        noise=Noise(scenario.noise.torque_variance, scenario.noise.hold) if scenario.noise else None,
+        duration=scenario.duration,
+        output_interval=scenario.output_interval,
+        tolerance=scenario.tolerance,
+        seed=scenario.seed,
+        configuration=scenario.to_yaml(),
+    )
+
+
+def _law(scenario: Scenario, robot: FlexibleJointRobot) -> AbstractLaw:
+    kind = RigidImpedanceLaw if isinstance(scenario.law, RigidSettings) else ImpedanceLaw
+    return kind(robot, TASKS[scenario.law.task], GRAVITIES[scenario.law.gravity])
+
+
+def _start(scenario: Scenario, robot: FlexibleJointRobot) -> Array:
+    q = np.array(scenario.posture, dtype=float)
+    if q.shape != (robot.n,):
+        raise SizeError(
+            f"posture does not fit robot {robot.name!r}",
+            got=f"{q.size} angles",
+            needs=f"{robot.n} angles in rad",
+        )
+    outside = np.flatnonzero((q < robot.position_limit[:, 0]) | (q > robot.position_limit[:, 1]))
+    if outside.size:
+        i = int(outside[0])
+        low, high = robot.position_limit[i]
+        raise ValueRangeError(
+            f"posture: joint {i + 1} of {robot.name!r} is outside its limits",
+            got=f"{q[i]:g} rad",
+            needs=f"{low:.4g} to {high:.4g} rad",
+            try_="degrees written with their unit, as '30 deg'" if np.abs(q[i]) > 7 else None,
+        )
+    return q
+
+
+def _refuse_singular(scenario: Scenario, jacobian: Array) -> None:
+    """Raise ValueRangeError where Λ of (31) does not exist and the law needs it."""
+    values = np.linalg.svd(jacobian, compute_uv=False)
+    enough = values.size == len(jacobian)
+    rigid, regularisation = isinstance(scenario.law, RigidSettings), scenario.law.regularisation
+    if values[-1] >= SINGULAR * values[0] and (enough or (regularisation > 0 and not rigid)):
+        return
+    if regularisation >= REGULAR and not rigid:
+        return
+    got = (
+        f"smallest singular value of J {values[-1]:.2e}"
+        if values.size == len(jacobian)
+        else f"{values.size} joints"
+    )
+    raise ValueRangeError(
+        f"posture is singular for task {scenario.law.task!r}"
+        + (", where the rigid law is not defined" if rigid else ""),
+        got=got,
+        needs=f"an end effector that can move in all {len(jacobian)} directions of the task",
+        try_="another posture, task: position, or "
+        + ("the impedance law" if rigid else f"regularisation of {REGULAR:g} 1/kg or more"),
+    )
+
+
+def _refuse_soft(robot: FlexibleJointRobot, q: Array, model: dict[str, Array], K_e: Array) -> None:
+    """Raise ValueRangeError where the fixed point of the static compensation contracts too slowly."""
+    step = 1e-5
+    slopes = [
+        (posture(robot, q + h, model).gravity_torque - posture(robot, q - h, model).gravity_torque)
+        / (2 * step)
+        for h in step * np.eye(robot.n)
+    ]
+    contraction = float(np.abs(np.linalg.eigvals(np.array(slopes).T / K_e[:, None])).max())
+    if contraction > SLOWEST_CONTRACTION:
+        raise ValueRangeError(
+            "shaped_stiffness is too soft for gravity: static",
+            got=f"the weight's slope is {contraction:.0%} of K_e",
+            needs=f"at most {SLOWEST_CONTRACTION:.0%}, so that its fixed point is found",
+            try_="a stiffer shaped_stiffness, or gravity: motor",
+        )
+
+
+def _tool(scenario: Scenario, plant: dict[str, Array]) -> dict[str, Array]:
+    rotation = plant["tool_rotation"]
+    offset = rotation @ np.array(scenario.tool.position)
+    turn = Rotation.from_rotvec(scenario.tool.rotation_vector).as_matrix()
+    return {"tool_position": plant["tool_position"] + offset, "tool_rotation": rotation @ turn}
+
+
+def _with_errors(scenario: Scenario, plant: dict[str, Array]) -> dict[str, Array]:
+    e = scenario.model_errors
+    factors = {
+        "joint_stiffness": e.joint_stiffness,
+        "joint_damping": e.joint_damping,
+        "motor_inertia": e.motor_inertia,
+        "link_mass": e.link_inertia,
+        "link_inertia": e.link_inertia,
+    }
+    return {name: value * (1 + factors.get(name, 0.0)) for name, value in plant.items()}

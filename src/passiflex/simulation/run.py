@@ -1,0 +1,222 @@
+"""The result of a simulation: signals with units, and everything needed to make it again."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+from dataclasses import dataclass
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from passiflex.errors import RunFileError
+from passiflex.files import whole_file
+from passiflex.layout import Field
+
+if TYPE_CHECKING:
+    from passiflex.simulation.closed_loop import ClosedLoop
+    from passiflex.simulation.problem import Problem
+
+FORMAT = "passiflex run 1"
+AXES = {
+    "position": ("axis",),
+    "desired_position": ("axis",),
+    "rotation": ("axis", "column"),
+    "desired_rotation": ("axis", "column"),
+    "wrench": ("component",),
+}
+AUDITED = (
+    "tank_energy",
+    "external_energy",
+    "motor_energy",
+    "joint_energy",
+    "joint_loss_energy",
+    "reference_energy",
+    "drawn_energy",
+    "spilled_energy",
+    "link_kinetic_energy",
+    "motor_kinetic_energy",
+    "joint_spring_energy",
+    "potential_energy",
+    "compensated_energy",
+    "shaped_kinetic_energy",
+    "shaped_spring_energy",
+    "cartesian_spring_energy",
+    "gravity_storage",
+)
+"""What the energy balances of a run are made of."""
+ATTRIBUTES = ("name", "failure", "events", "has_tank", "configuration")
+COORDINATES = {
+    "axis": ["x", "y", "z"],
+    "column": ["x", "y", "z"],
+    "component": ["fx", "fy", "fz", "mx", "my", "mz"],
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """A simulated run.
+
+    Attributes
+    ----------
+    data: All signals over time; every variable has the attributes `units` and `long_name`. Energies
+        (`*_energy`) are in J since the start, powers (`*_power`) in W.
+    """
+
+    data: xr.Dataset
+
+    @property
+    def name(self) -> str:
+        """Return the name of the scenario."""
+        return str(self.data.attrs["name"])
+
+    @property
+    def failure(self) -> str:
+        """Return why the run ended early; empty if it did not."""
+        return str(self.data.attrs["failure"])
+
+    @property
+    def events(self) -> list[dict[str, Any]]:
+        """Return what happened at single instants, as the jumps of the reference and what they cost."""
+        return list(json.loads(self.data.attrs["events"]))
+
+    @property
+    def time(self) -> NDArray[np.float64]:
+        """Return the time [s]."""
+        return self.data["time"].to_numpy()
+
+    def __getitem__(self, name: str) -> NDArray[np.float64]:
+        """Return a signal as an array; time is the first axis."""
+        return self.data[name].to_numpy()
+
+    def save(self, path: str | Path) -> Path:
+        """Write one netCDF4 file, whole or not at all, and return its path."""
+        path = Path(path)
+        compressed = {v: {"zlib": True, "complevel": 4, "shuffle": True} for v in self.data.data_vars}
+        with whole_file(path) as temporary:
+            self.data.to_netcdf(temporary, engine="h5netcdf", encoding=compressed)
+        return path
+
+    @classmethod
+    def load(cls, path: str | Path) -> Run:
+        """Read a run.
+
+        Raises
+        ------
+        RunFileError
+            If the file is not there, or is not a run of this package.
+        """
+        path = Path(path)
+        if not path.is_file():
+            raise RunFileError(f"no such file: {path}", try_="passiflex simulate SCENARIO.yaml --out RUN.nc")
+        try:
+            data = xr.load_dataset(path, engine="h5netcdf")
+        except Exception as error:  # the readers raise many kinds for a file that is no netCDF
+            raise RunFileError(
+                f"{path} is not a netCDF file, or is cut short", got=type(error).__name__
+            ) from error
+        if data.attrs.get("format") != FORMAT:
+            raise RunFileError(
+                f"{path} is not a run of this version",
+                got=data.attrs.get("format", "no format"),
+                needs=repr(FORMAT),
+            )
+        missing = [name for name in (*AUDITED, "time") if name not in data]
+        missing += [name for name in ATTRIBUTES if name not in data.attrs]
+        if missing or not data.sizes.get("time"):
+            got = f"no {', '.join(missing)}" if missing else "no rows"
+            raise RunFileError(f"{path} is not a complete run", got=got)
+        broken = [name for name in (*AUDITED, "time") if not np.isfinite(data[name].to_numpy()).all()]
+        if broken:
+            raise RunFileError(f"{path} has numbers that are not finite", got=f"in {', '.join(broken)}")
+        return cls(data)
+
+
+def assemble(
+    problem: Problem,
+    loop: ClosedLoop,
+    time: NDArray[np.float64],
+    states: NDArray[np.float64],
+    energies: NDArray[np.float64],
+    outputs: NDArray[np.float64],
+    events: list[dict[str, Any]],
+    failure: str,
+) -> Run:
+    """Return the run of recorded rows."""
+    from passiflex.simulation.closed_loop import ENERGIES
+
+    variables: dict[str, Any] = {}
+
+    def add(fields: Any, rows: dict[str, NDArray[np.float64]], suffix: str = "") -> None:
+        for f in fields:
+            variables[f.name + suffix] = (_dims(f), rows[f.name], {"units": f.unit, "long_name": f.meaning})
+
+    add(loop.state, loop.state.unpack(states))
+    add(ENERGIES, ENERGIES.unpack(energies), "_energy")
+    add(loop.output_layout, loop.output_layout.unpack(outputs))
+    n = problem.law.robot.n
+    robot, (angle, speed, torque) = problem.law.robot, loop.joint_units
+    for name, limit, unit in (
+        ("torque_limit", robot.torque_limit, torque),
+        ("velocity_limit", robot.velocity_limit, speed),
+        ("lower_position_limit", robot.position_limit[:, 0], angle),
+        ("upper_position_limit", robot.position_limit[:, 1], angle),
+    ):
+        variables[name] = (("joint",), limit, {"units": unit, "long_name": "of the robot; not applied"})
+    used = {d for dims, *_ in variables.values() for d in dims}
+    coordinates: dict[str, Any] = {k: v for k, v in COORDINATES.items() if k in used}
+    coordinates["joint"] = np.arange(1, n + 1)
+    coordinates["time"] = ("time", time, {"units": "s", "long_name": "time"})
+    attributes = {
+        "format": FORMAT,
+        "name": problem.name,
+        "robot": robot.name,
+        "law": type(problem.law).__name__,
+        "configuration": problem.configuration,
+        "sources": json.dumps(robot.sources, ensure_ascii=False),
+        "seed": problem.seed,
+        "has_tank": int(problem.law.has_tank),
+        "version": package_version(),
+        "commit": source_commit(),
+        "events": json.dumps(events),
+        "failure": failure,
+        "duration": problem.duration,
+        "tolerance": problem.tolerance,
+    }
+    return Run(xr.Dataset(variables, coordinates, attributes))
+
+
+def _dims(f: Field) -> tuple[str, ...]:
+    return ("time", *(AXES.get(f.name) or ("joint",) * len(f.shape)))
+
+
+def package_version() -> str:
+    """Return the installed version."""
+    try:
+        return version("passiflex")
+    except PackageNotFoundError:
+        return "unknown"
+
+
+@cache
+def source_commit() -> str:
+    """Return the git commit of the source, with `+` if it was changed since; "unknown" outside a checkout."""
+    folder = Path(__file__).parent
+
+    def git(*arguments: str) -> str:
+        command = ["git", "-C", str(folder), *arguments]
+        return subprocess.run(command, capture_output=True, text=True, check=True, timeout=10).stdout.strip()
+
+    try:
+        git(
+            "ls-files", "--error-unmatch", __file__
+        )  # an installed copy may lie inside somebody else's checkout
+        changed = "+" if git("status", "--porcelain", "--", str(folder)) else ""
+        return git("rev-parse", "HEAD") + changed
+    except (OSError, subprocess.SubprocessError):
+        return "unknown"
