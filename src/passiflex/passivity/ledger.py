@@ -1,0 +1,134 @@
+"""Energy balances of a run: storages, ports and losses, and what is left over.
+
+Each balance says  H(t) − H(0) = supplied − dissipated + residual.  Energies are in J, ports count
+positive into the system.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from passiflex.simulation.run import Run
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Balance:
+    """One energy balance over time.
+
+    Attributes
+    ----------
+    name: Which system it is about.
+    storages: Energy stored in each element [J].
+    supplied: Energy that came in through each port since the start [J].
+    dissipated: Energy lost in each element since the start [J].
+    """
+
+    name: str
+    storages: dict[str, Array]
+    supplied: dict[str, Array]
+    dissipated: dict[str, Array]
+
+    @property
+    def total(self) -> Array:
+        """Return H(t) [J]."""
+        return np.sum(list(self.storages.values()), axis=0)
+
+    @property
+    def residual(self) -> Array:
+        """Return H(t) − H(0) − supplied + dissipated [J]."""
+        total = self.total
+        flow = np.sum(list(self.supplied.values()), axis=0) - np.sum(list(self.dissipated.values()), axis=0)
+        return total - total[0] - flow
+
+    @property
+    def worst(self) -> float:
+        """Return max |residual| [J]."""
+        return float(np.abs(self.residual).max())
+
+
+def robot_balance(run: Run) -> Balance:
+    """Return the balance of the real robot, (3)–(4): true whatever the law; its residual is the integrator's."""
+    return Balance(
+        "robot",
+        {
+            "links": run["link_kinetic_energy"],
+            "motors": run["motor_kinetic_energy"],
+            "joint springs": run["joint_spring_energy"],
+            "gravity": run["potential_energy"],
+        },
+        {"environment": run["external_energy"], "motor torque": run["motor_energy"]},
+        {"joint dampers": run["joint_loss_energy"]},
+    )
+
+
+def link_balance(run: Run) -> Balance:
+    """Return the balance of the links alone, between environment and joints: true whatever the law."""
+    return Balance(
+        "links",
+        {"links": run["link_kinetic_energy"], "gravity": run["potential_energy"]},
+        {"environment": run["external_energy"], "joints": run["joint_energy"]},
+        {"nothing": np.zeros_like(run["joint_energy"])},
+    )
+
+
+def claimed_balance(run: Run) -> Balance:
+    """Return the law's own books: 𝓗₂ of (28) with (29), links included.
+
+    They close if the law's model is right. The residual is the energy that the books miss: of model
+    errors, of noise, of whatever the law does not know.
+    """
+    return Balance(
+        "law",
+        {
+            "links": run["link_kinetic_energy"],
+            "gravity": run["potential_energy"],
+            "shaped motors": run["shaped_kinetic_energy"],
+            "shaped springs": run["shaped_spring_energy"],
+            "Cartesian spring": run["cartesian_spring_energy"],
+            "gravity compensation": run["gravity_storage"],
+            "tank": run["tank_energy"] if run.data.attrs["has_tank"] else np.zeros_like(run["tank_energy"]),
+        },
+        {"environment": run["external_energy"], "reference": run["reference_energy"]},
+        {"drawn from the tank": run["drawn_energy"], "dampers past the tank": run["spilled_energy"]},
+    )
+
+
+def motor_side_storage(run: Run) -> Array:
+    """Return S̃(t) [J]: what law and motors store, with the weight that the law knows of carried.
+
+    S̃ = ½ φ̇ᵀ B_e φ̇ + U(φ; x_d) + [V̂(q) + ½ (φ−q)ᵀ K_e (φ−q) − V_γ(φ)], with V̂ of the law's model. The
+    bracket is ≥ 0, as V_γ is its minimum over q.
+    """
+    return (
+        run["shaped_kinetic_energy"]
+        + run["cartesian_spring_energy"]
+        + run["shaped_spring_energy"]
+        + run["compensated_energy"]
+        + run["gravity_storage"]
+    )
+
+
+def port_energy(run: Run) -> Array:
+    """Return W̃(t) [J]: given to the links through the joints, ∫ τ_aᵀ q̇, less the weight lifted by it."""
+    carried = run["compensated_energy"]
+    return run["joint_energy"] - (carried - carried[0])
+
+
+def port_tank(run: Run) -> Array:
+    """Return what a tank at the joint port would hold [J]: T₀ − (S̃ − S̃₀) − W̃.
+
+    It needs no formula for dissipation: with a perfect model it is T₀ + ∫ (P_D − P_X); otherwise it is
+    what is really left of T₀.
+    """
+    stored = motor_side_storage(run)
+    return initial_tank(run) - (stored - stored[0]) - port_energy(run)
+
+
+def initial_tank(run: Run) -> float:
+    """Return T₀ [J]; 0 for a law without a tank."""
+    return float(run["tank_energy"][0]) if run.data.attrs["has_tank"] else 0.0
