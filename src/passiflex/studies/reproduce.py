@@ -1,0 +1,150 @@
+"""Reproduce the paper: run, draw, sum up, write."""
+
+from __future__ import annotations
+
+import json
+import textwrap
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from passiflex.errors import NameUnknownError
+from passiflex.files import require_writable, whole_file
+from passiflex.passivity import claimed_balance
+from passiflex.plotting.figures import CircleColumn, Curve, StepColumn, draw_circle, draw_steps, save_figure
+from passiflex.robots import FlexibleJointRobot
+from passiflex.simulation import Scenario
+from passiflex.simulation.law_settings import ImpedanceSettings
+from passiflex.simulation.run import package_version, source_commit
+from passiflex.simulation.scenario import Circle, Step
+from passiflex.studies.paper import FIGURES, Case, Report, figure_cases
+from passiflex.studies.summary import displacement, summarise
+
+TITLES = {
+    "robot": "gravity: the robot's own compensation\n(as in the paper)",
+    "static": "gravity in plant and law\n(static compensation by the law's model)",
+}
+
+
+def reproduce(
+    figures: Sequence[str], folder: Path, report: Report = lambda text: None
+) -> dict[str, list[Path]]:
+    """Run the given figures (all if empty), and return what was written into `folder`, by figure.
+
+    Each figure gives a PNG, a PDF and its runs as netCDF; all give their part of `summary.json`, which
+    keeps what earlier calls wrote about other figures of the same version.
+
+    Raises
+    ------
+    NameUnknownError
+        For a figure that the paper does not have.
+    """
+    for name in figures:
+        if name not in FIGURES:
+            raise NameUnknownError("figure", name, FIGURES)
+    require_writable(folder)
+    written: dict[str, list[Path]] = {}
+    summary: dict[str, Any] = {}
+    for name in figures or FIGURES:
+        cases = list(figure_cases(name, report))
+        summary |= {case.name: summarise(case) for case in cases}
+        report(f"{name}: drawing and writing")
+        drawing = _draw(name, [case for case in cases if not case.name.endswith("noise_free")])
+        written[name] = save_figure(drawing, folder / name)
+        for case in cases:
+            for law, run in case.runs.items():
+                written[name].append(run.save(folder / f"{case.name}_{law}.nc"))
+    written["summary"] = [_write_summary(folder / "summary.json", summary)]
+    return written
+
+
+def conditions(scenario: Scenario) -> str:
+    """Return the conditions of a figure in a few lines, to stand beside it."""
+    law, tank, robot = scenario.law, scenario.tank, FlexibleJointRobot.load(scenario.robot)
+    assert isinstance(law, ImpedanceSettings)
+    assert tank is not None
+    angles = ", ".join(f"{a:g}" for a in scenario.posture)
+    K, D = _common(robot.joint_stiffness), _common(robot.joint_damping)
+    K_x, D_x = _common(np.diag(law.stiffness.full())), _common(np.diag(law.damping.full()))
+    return (
+        f"{scenario.robot}, q₀ = [{angles}] rad, K = {K} N m/rad{_assumed(robot, 'joint_stiffness')}, "
+        f"D = {D} N m s/rad{_assumed(robot, 'joint_damping')}\n"
+        f"K_e = {law.shaped_stiffness.ratio:g} K, B_e = {law.shaped_inertia.ratio:g} B, "
+        f"k_ns = {law.null_space_damping:g} 1/s, K_x = {K_x}, D_x = {D_x} (SI, all directions), "
+        f"tank {tank.initial:g} J, {tank.accounting} accounting\n"
+        f"{_task(scenario)}"
+    )
+
+
+def _task(scenario: Scenario) -> str:
+    """Return what reference and forces do, in words."""
+    words = []
+    for e in scenario.reference:
+        if isinstance(e, Step):
+            words.append(f"step of x_d by {list(e.by)} m at {e.at:g} s")
+        elif isinstance(e, Circle):
+            plane = "-".join(e.plane)
+            words.append(f"circle in {plane} from {e.at:g} s: radius {e.radius:g} m, period {e.period:g} s")
+    words += [f"force {list(f.force)} N from {f.start:g} s to {f.end:g} s" for f in scenario.forces]
+    errors = {k.replace("_", " "): v for k, v in scenario.model_errors.model_dump().items() if v}
+    if errors:
+        words.append("law's model: " + ", ".join(f"{k} {v:+.0%}" for k, v in errors.items()))
+    if scenario.noise:
+        n = scenario.noise
+        words.append(f"noise on τ_a: {n.torque_variance:g} (N m)², held {n.hold:g} s, seed {scenario.seed}")
+    return textwrap.fill("; ".join(words), 130)
+
+
+def _assumed(robot: FlexibleJointRobot, name: str) -> str:
+    return " (assumed)" if robot.sources[name].startswith("assumed") else ""
+
+
+def _common(values: NDArray[np.float64]) -> str:
+    return f"{values[0]:g}" if np.ptp(values) == 0 else ", ".join(f"{v:g}" for v in values)
+
+
+def _draw(name: str, cases: list[Case]) -> Any:
+    text = conditions(cases[0].scenario)
+    if name == "fig2":
+        return draw_circle([_circle_column(case) for case in cases], text)
+    return draw_steps([_step_column(case) for case in cases], text)
+
+
+def _title(case: Case) -> str:
+    return TITLES[case.scenario.law.gravity]
+
+
+def _step_column(case: Case) -> StepColumn:
+    curves = {name: Curve(run.time, displacement(run)) for name, run in case.runs.items()}
+    curves |= {name: Curve(r.time, r.displacement) for name, r in case.msd.items()}
+    return StepColumn(_title(case), curves)
+
+
+def _circle_column(case: Case) -> CircleColumn:
+    run = case.runs["proposed"]
+    total = claimed_balance(run).total
+    return CircleColumn(
+        title=_title(case),
+        time=run.time,
+        position=run["position"],
+        reference=run["desired_position"],
+        energies={"total": total, "robot": total - run["tank_energy"], "tank": run["tank_energy"]},
+        joints=run["q"],
+    )
+
+
+def _write_summary(path: Path, cases: dict[str, Any]) -> Path:
+    source = {"version": package_version(), "commit": source_commit()}
+    kept: dict[str, Any] = {}
+    try:
+        earlier = json.loads(path.read_text(encoding="utf-8"))
+        kept = earlier if earlier.get("source") == source else {}
+    except (OSError, ValueError, AttributeError):
+        pass
+    everything = {"source": source, **{k: v for k, v in kept.items() if k != "source"}, **cases}
+    with whole_file(path) as temporary:
+        temporary.write_text(json.dumps(everything, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    return path
