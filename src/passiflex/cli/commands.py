@@ -1,0 +1,154 @@
+"""The commands. Each says what it wrote and how long it took."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated
+
+import cyclopts
+from rich.console import Console
+from rich.table import Table
+
+app = cyclopts.App(
+    name="passiflex",
+    help="Passive Cartesian impedance control of flexible-joint robots, with its energy accounted for.",
+)
+console = Console(soft_wrap=True, highlight=False)
+EXIT = {"passive": 0, "violated": 1, "inconclusive": 2}
+
+
+@app.command
+def reproduce(
+    *figures: str,
+    out: Annotated[Path, cyclopts.Parameter(help="folder for figures, runs and summary.json")] = Path(
+        "results"
+    ),
+    sensitivity: Annotated[
+        bool, cyclopts.Parameter(negative="", help="sweep what the paper does not print")
+    ] = False,
+) -> int:
+    """Reproduce the paper's figures: fig1, fig2, fig3; all of them if none is named.
+
+    Writes per figure a PNG, a PDF and the runs as netCDF, and one summary.json. With --sensitivity, one
+    figure that shows how the conclusions move with what the paper does not print.
+    """
+    with _timed():
+        if sensitivity:
+            from passiflex.studies.sensitivity import run_sensitivity
+
+            _refuse_names(figures)
+            with _progress() as report:
+                written = {"sensitivity": run_sensitivity(out, report)}
+        else:
+            from passiflex.studies.reproduce import reproduce as run_reproduce
+
+            with _progress() as report:
+                written = run_reproduce(figures, out, report)
+        for paths in written.values():
+            for path in paths:
+                console.print(f"wrote {path}")
+    return 0
+
+
+@app.command
+def simulate(
+    scenario: Path,
+    *,
+    out: Annotated[Path, cyclopts.Parameter(help="netCDF file to write")],
+) -> int:
+    """Run a scenario file and write the run as one netCDF file; exit status 2 if the run ended early."""
+    from passiflex.files import require_writable
+    from passiflex.simulation import load_scenario, resolve, simulate_problem
+
+    with _timed():
+        with _progress() as report:
+            _refuse_target(scenario, out)
+            read = load_scenario(scenario)
+            require_writable(out.parent)
+            problem = resolve(read)
+            report(f"{read.name}: compiling and running")
+            run = simulate_problem(problem)
+        if run.failure:
+            console.print(f"the run ended early, at {run.time[-1]:g} s of {read.duration:g} s: {run.failure}")
+        console.print(f"wrote {run.save(out)}")
+    return 2 if run.failure else 0
+
+
+@app.command
+def audit(run: Path) -> int:
+    """Audit a run: exit status 0 passive, 1 violated, 2 inconclusive or not usable."""
+    from passiflex.passivity import audit as audit_run
+    from passiflex.simulation.run import Run
+
+    result = audit_run(Run.load(run))
+    table = Table(
+        "balance", "change of stored energy", "supplied", "dissipated", "largest residual", title=str(run)
+    )
+    for balance in result.balances:
+        supplied = sum(v[-1] for v in balance.supplied.values())
+        dissipated = sum(v[-1] for v in balance.dissipated.values())
+        numbers = (balance.total[-1] - balance.total[0], supplied, dissipated)
+        table.add_row(balance.name, *(f"{v:+.6g} J" for v in numbers), f"{balance.worst:.2e} J")
+    console.print(table)
+    console.print(f"verdict: {result.verdict}")
+    decided = "least margin" if result.verdict == "passive" else "decided"
+    console.print(f"{decided} at {result.time:g} s, most of it taken by: {result.term}")
+    console.print(f"margin: {result.margin:.6g} J, integration error {result.integration_error:.1e} J")
+    if result.books_error > max(10 * result.integration_error, 1e-6):
+        console.print(
+            f"the law's own books are wrong by up to {result.books_error:.3g} J (model error or noise)"
+        )
+    if result.verdict != "passive":
+        console.print(f"remedy: {result.remedy}")
+    return EXIT[result.verdict]
+
+
+@app.command
+def robots() -> int:
+    """List the robots of the catalogue, and where their numbers come from."""
+    from passiflex.robots.catalogue import catalogue, read_description
+
+    for name in catalogue():
+        description = read_description(name)
+        console.print(f"[bold]{name}[/bold]: {description.chain.n} joints")
+        for quantity, source in description.sources.items():
+            console.print(f"  {quantity}: {source}", markup=False)
+    return 0
+
+
+def _refuse_target(scenario: Path, out: Path) -> None:
+    from passiflex.files import OutputError
+
+    if out.suffix != ".nc" or out.is_dir() or out.resolve() == scenario.resolve():
+        raise OutputError("--out is no netCDF file", got=str(out), needs="a file name that ends in .nc")
+
+
+def _refuse_names(figures: tuple[str, ...]) -> None:
+    from passiflex.errors import PassiflexError
+
+    if figures:
+        raise PassiflexError("--sensitivity takes no figure names", got=" ".join(figures))
+
+
+@contextmanager
+def _timed() -> Iterator[None]:
+    start = time.perf_counter()
+    yield
+    console.print(f"took {time.perf_counter() - start:.1f} s")
+
+
+@contextmanager
+def _progress() -> Iterator[Callable[[str], None]]:
+    """Give a function that shows what is being done: live on a terminal, a line each otherwise."""
+    if not console.is_terminal:
+        yield lambda text: console.print(text)
+        return
+    with console.status("starting") as status:
+
+        def report(text: str) -> None:
+            status.update(text)
+
+        yield report
