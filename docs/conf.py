@@ -1,0 +1,29 @@
+"""Configuration of the documentation: `make docs`, or sphinx-build -W -b html docs docs/_build/html."""
+
+import sys
+from pathlib import Path
+
+HERE = Path(__file__).parent
+sys.path[:0] = [str(HERE / "_ext"), str(HERE.parent / "src")]
+
+project = "passiflex"
+author = "the passiflex authors"
+exclude_patterns = ["_build"]
+
+extensions = ["myst_parser", "sphinx.ext.autodoc", "mathml", "scenario_tables", "docstrings"]
+myst_enable_extensions = ["amsmath", "colon_fence", "deflist", "dollarmath"]
+myst_heading_anchors = 3
+default_role = "code"
+
+autodoc_member_order = "bysource"
+autodoc_preserve_defaults = True
+autodoc_typehints_format = "short"
+python_maximum_signature_line_length = 100
+
+html_theme = "furo"
+html_title = "passiflex"
+html_static_path = ["_static"]
+html_css_files = ["equations.css"]
+html_math_renderer = "mathml"
+html_show_copyright = False
+html_copy_source = False
