@@ -364,3 +364,21 @@ def test_a_number_that_is_none_is_never_passive(signal: str, tmp_path: Path) -> 
     broken.save(tmp_path / "run.nc")
     with pytest.raises(RunFileError, match=f"numbers that are not finite; got in .*{signal}"):
         Run.load(tmp_path / "run.nc")
+
+
+def test_the_power_of_every_flow_is_the_slope_of_its_energy() -> None:
+    """Between two rows the energy grows by the mean power there, to the second order of their distance."""
+    original = moving()
+    step = np.diff(original.time)
+    for balance in (robot_balance(original), link_balance(original), claimed_balance(original)):
+        assert set(balance.supplied_power) == set(balance.supplied)
+        assert set(balance.dissipated_power) == set(balance.dissipated)
+        for energies, powers in (
+            (balance.supplied, balance.supplied_power),
+            (balance.dissipated, balance.dissipated_power),
+        ):
+            for name, energy in energies.items():
+                mean = (powers[name][1:] + powers[name][:-1]) / 2
+                curvature = np.abs(np.diff(powers[name], 2)).max(initial=0.0) + 1e-9
+                smooth = np.abs(np.diff(energy) - mean * step)
+                assert np.quantile(smooth, 0.9) <= curvature * step.max(), name

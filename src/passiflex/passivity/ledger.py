@@ -6,7 +6,7 @@ positive into the system.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,12 +26,35 @@ class Balance:
     storages: Energy stored in each element [J].
     supplied: Energy that came in through each port since the start [J].
     dissipated: Energy lost in each element since the start [J].
+    supplied_power, dissipated_power: The same as power [W]. The jumps of a reference are energy at an
+        instant, and in no power.
     """
 
     name: str
     storages: dict[str, Array]
     supplied: dict[str, Array]
     dissipated: dict[str, Array]
+    supplied_power: dict[str, Array] = field(default_factory=dict)
+    dissipated_power: dict[str, Array] = field(default_factory=dict)
+
+    @classmethod
+    def of(
+        cls,
+        run: Run,
+        name: str,
+        storages: dict[str, Array],
+        supplied: dict[str, str],
+        dissipated: dict[str, str],
+    ) -> Balance:
+        """Return the balance whose flows are signals of the run, as in {"environment": "external"}."""
+        return cls(
+            name,
+            storages,
+            {port: run[f"{signal}_energy"] for port, signal in supplied.items()},
+            {loss: run[f"{signal}_energy"] for loss, signal in dissipated.items()},
+            {port: run[f"{signal}_power"] for port, signal in supplied.items()},
+            {loss: run[f"{signal}_power"] for loss, signal in dissipated.items()},
+        )
 
     @property
     def total(self) -> Array:
@@ -53,7 +76,8 @@ class Balance:
 
 def robot_balance(run: Run) -> Balance:
     """Return the balance of the real robot, (3)–(4): true whatever the law; its residual is the integrator's."""
-    return Balance(
+    return Balance.of(
+        run,
         "robot",
         {
             "links": run["link_kinetic_energy"],
@@ -61,18 +85,19 @@ def robot_balance(run: Run) -> Balance:
             "joint springs": run["joint_spring_energy"],
             "gravity": run["potential_energy"],
         },
-        {"environment": run["external_energy"], "motor torque": run["motor_energy"]},
-        {"joint dampers": run["joint_loss_energy"]},
+        {"environment": "external", "motor torque": "motor"},
+        {"joint dampers": "joint_loss"},
     )
 
 
 def link_balance(run: Run) -> Balance:
     """Return the balance of the links alone, between environment and joints: true whatever the law."""
-    return Balance(
+    return Balance.of(
+        run,
         "links",
         {"links": run["link_kinetic_energy"], "gravity": run["potential_energy"]},
-        {"environment": run["external_energy"], "joints": run["joint_energy"]},
-        {"nothing": np.zeros_like(run["joint_energy"])},
+        {"environment": "external", "joints": "joint"},
+        {},
     )
 
 
@@ -82,7 +107,8 @@ def claimed_balance(run: Run) -> Balance:
     They close if the law's model is right. The residual is the energy that the books miss: of model
     errors, of noise, of whatever the law does not know.
     """
-    return Balance(
+    return Balance.of(
+        run,
         "law",
         {
             "links": run["link_kinetic_energy"],
@@ -93,8 +119,8 @@ def claimed_balance(run: Run) -> Balance:
             "gravity compensation": run["gravity_storage"],
             "tank": run["tank_energy"] if run.data.attrs["has_tank"] else np.zeros_like(run["tank_energy"]),
         },
-        {"environment": run["external_energy"], "reference": run["reference_energy"]},
-        {"drawn from the tank": run["drawn_energy"], "dampers past the tank": run["spilled_energy"]},
+        {"environment": "external", "reference": "reference"},
+        {"drawn from the tank": "drawn", "dampers past the tank": "spilled"},
     )
 
 

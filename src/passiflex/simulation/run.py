@@ -48,6 +48,10 @@ AUDITED = (
     "shaped_spring_energy",
     "cartesian_spring_energy",
     "gravity_storage",
+    *(
+        f"{flow}_power"
+        for flow in ("external", "motor", "joint", "joint_loss", "reference", "drawn", "spilled")
+    ),
 )
 """What the energy balances of a run are made of."""
 ATTRIBUTES = ("name", "failure", "events", "has_tank", "configuration")
