@@ -24,7 +24,7 @@ def compensation(robot: FlexibleJointRobot, gravity: AbstractGravity) -> cs.Func
     """Return (φ, q, K_e, m) → torque, storage, −∇storage, V(q) + ½ (φ−q)ᵀ K_e (φ−q)."""
     phi, q, K_e = (cs.SX.sym(s, robot.n) for s in ("phi", "q", "K_e"))
     vector, m = robot.layout.symbols("m")
-    torque, storage = gravity.compensation(robot.arm, phi, K_e, m)
+    torque, storage, _ = gravity.compensation(robot.arm, phi, K_e, m)
     carried = robot.arm.potential_energy(q, m) + cs.dot(phi - q, K_e * (phi - q)) / 2
     return cs.Function(
         "compensation", [phi, q, K_e, vector], [torque, storage, -cs.gradient(storage, phi), carried]

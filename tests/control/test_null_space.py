@@ -11,7 +11,11 @@ import pytest
 from hypothesis import given, settings
 
 from loops import SEEDS, robots
-from passiflex.control.null_space import inverse_cartesian_inertia, null_space_damping, null_space_torque
+from passiflex.control.null_space import (
+    inverse_cartesian_inertia,
+    null_space_contribution,
+    null_space_damping,
+)
 from passiflex.robots.arm import SerialArm
 from passiflex.robots.catalogue import read_description
 from passiflex.robots.flexible import FlexibleJointRobot
@@ -40,7 +44,7 @@ def formulas(n: int, rows: int) -> cs.Function:
     )  # fmt: skip
     out = [
         null_space_damping(M, J, k, eps),
-        null_space_torque(M, J, k, dphi, eps),
+        null_space_contribution(M, J, k, dphi, eps).torque,
         inverse_cartesian_inertia(M, J, eps),
     ]
     return cs.Function("null_space", [M, J, k, dphi, eps], out)

@@ -5,18 +5,12 @@ from __future__ import annotations
 import abc
 from dataclasses import dataclass
 from types import SimpleNamespace
-from typing import ClassVar, NamedTuple
+from typing import ClassVar
 
 import casadi as cs
 
+from passiflex.control.signals import Contribution
 from passiflex.robots.arm import SerialArm
-
-
-class Compensation(NamedTuple):
-    """A torque on the shaped motor (n,) N m, and the potential [J] whose negative gradient in φ it is."""
-
-    torque: cs.SX
-    storage: cs.SX
 
 
 class AbstractGravity(abc.ABC):
@@ -25,7 +19,7 @@ class AbstractGravity(abc.ABC):
     in_model: ClassVar[bool]
 
     @abc.abstractmethod
-    def compensation(self, arm: SerialArm, phi: cs.SX, K_e: cs.SX, m: SimpleNamespace) -> Compensation:
+    def compensation(self, arm: SerialArm, phi: cs.SX, K_e: cs.SX, m: SimpleNamespace) -> Contribution:
         """Return torque and storage at φ (n,), with the shaped stiffness K_e (n,) and the law's model m."""
 
 
@@ -35,9 +29,9 @@ class RobotGravity(AbstractGravity):
 
     in_model: ClassVar[bool] = False
 
-    def compensation(self, arm: SerialArm, phi: cs.SX, K_e: cs.SX, m: SimpleNamespace) -> Compensation:
+    def compensation(self, arm: SerialArm, phi: cs.SX, K_e: cs.SX, m: SimpleNamespace) -> Contribution:
         """Return zero and zero."""
-        return Compensation(cs.SX.zeros(arm.n), cs.SX(0))
+        return Contribution(cs.SX.zeros(arm.n), cs.SX(0), cs.SX(0))
 
 
 @dataclass(frozen=True)
@@ -46,9 +40,9 @@ class MotorGravity(AbstractGravity):
 
     in_model: ClassVar[bool] = True
 
-    def compensation(self, arm: SerialArm, phi: cs.SX, K_e: cs.SX, m: SimpleNamespace) -> Compensation:
+    def compensation(self, arm: SerialArm, phi: cs.SX, K_e: cs.SX, m: SimpleNamespace) -> Contribution:
         """Return ∇V(φ) and −V(φ)."""
-        return Compensation(arm.gravity_torque(phi, m), -arm.potential_energy(phi, m))
+        return Contribution(arm.gravity_torque(phi, m), -arm.potential_energy(phi, m), cs.SX(0))
 
 
 @dataclass(frozen=True)
@@ -72,12 +66,12 @@ class StaticGravity(AbstractGravity):
             rest = phi - gravity(rest, _flat(m)) / K_e
         return rest
 
-    def compensation(self, arm: SerialArm, phi: cs.SX, K_e: cs.SX, m: SimpleNamespace) -> Compensation:
+    def compensation(self, arm: SerialArm, phi: cs.SX, K_e: cs.SX, m: SimpleNamespace) -> Contribution:
         """Return K_e (φ − q̄) = ∇V(q̄) and −V_γ(φ)."""
         rest = self.rest_position(arm, phi, K_e, m)
         deflection = phi - rest
         minimum = arm.potential_energy(rest, m) + cs.dot(deflection, K_e * deflection) / 2
-        return Compensation(K_e * deflection, -minimum)
+        return Contribution(K_e * deflection, -minimum, cs.SX(0))
 
 
 def _flat(m: SimpleNamespace) -> cs.SX:

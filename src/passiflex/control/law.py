@@ -12,7 +12,7 @@ import casadi as cs
 
 from passiflex.control.gravity import AbstractGravity, RobotGravity
 from passiflex.control.inner_loop import motor_torque, shaped_damping, shaped_motion
-from passiflex.control.null_space import null_space_torque
+from passiflex.control.null_space import null_space_contribution
 from passiflex.control.signals import Command, LawEnergy, Measurement, Reference
 from passiflex.control.task import AbstractTask, PoseTask
 from passiflex.layout import Field, Layout
@@ -86,11 +86,11 @@ class ImpedanceLaw(AbstractLaw):
         M = arm.mass_matrix(y.q, m)
         J_q = arm.jacobian(y.q, m)
         J = arm.jacobian(phi, m)[rows, :]
-        dx = J @ dphi
-        spring = self.task.spring(arm.pose(phi, m), reference.pose, g.stiffness)
+        impedance = self.task.impedance(arm.pose(phi, m), reference.pose, J, J @ dphi, g.stiffness, g.damping)
+        spring_damper = impedance.contribution  # (12)
         weight = self.gravity.compensation(arm, phi, K_e, m)
-        tau_null = null_space_torque(M, J_q[rows, :], g.null_space_damping, dphi, g.regularisation)  # (32)
-        tau_u = -J.T @ (spring.gradient[rows] + g.damping @ dx) + weight.torque + tau_null  # (12)
+        null = null_space_contribution(M, J_q[rows, :], g.null_space_damping, dphi, g.regularisation)  # (32)
+        tau_u = spring_damper.torque + weight.torque + null.torque
 
         tau_e = J_q.T @ y.F_e
         expected = solve_spd(M, y.tau_a + tau_e - arm.bias_torque(y.q, y.dq, m))
@@ -99,11 +99,11 @@ class ImpedanceLaw(AbstractLaw):
         energy = LawEnergy(
             motor_kinetic=cs.dot(dphi, B_e * dphi) / 2,
             joint_spring=cs.dot(phi - y.q, K_e * (phi - y.q)) / 2,
-            cartesian_spring=spring.potential,
+            cartesian_spring=spring_damper.storage,
             gravity_storage=weight.storage,
             joint_damping=cs.dot(stretch, D_e * stretch),
-            cartesian_damping=cs.dot(dx, g.damping @ dx),
-            null_space_damping=-cs.dot(dphi, tau_null),
-            reference_power=cs.dot(spring.reference_gradient, reference.velocity),  # (21)
+            cartesian_damping=spring_damper.dissipation,
+            null_space_damping=null.dissipation,
+            reference_power=cs.dot(impedance.reference_gradient, reference.velocity),  # (21)
         )
         return Command(tau_m, tau_u, phi, dphi, energy)

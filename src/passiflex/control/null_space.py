@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import casadi as cs
 
+from passiflex.control.signals import Contribution
 from passiflex.robots.linear_algebra import solve_spd
 
 
@@ -27,9 +28,10 @@ def null_space_damping(
     return gain * (mass_matrix - half.T @ half)
 
 
-def null_space_torque(
+def null_space_contribution(
     mass_matrix: cs.SX, jacobian: cs.SX, gain: cs.SX, dphi: cs.SX, regularisation: cs.SX | float = 0.0
-) -> cs.SX:
-    """Return τ_u2 = −[I − Jᵀ J̄ᵀ] k_ns M φ̇ = −D_ns φ̇ of (32) [N m]."""
+) -> Contribution:
+    """Return τ_u2 = −[I − Jᵀ J̄ᵀ] k_ns M φ̇ = −D_ns φ̇ of (32) [N m]; it stores nothing and dissipates φ̇ᵀ D_ns φ̇."""
     mobility = inverse_cartesian_inertia(mass_matrix, jacobian, regularisation)
-    return -gain * (mass_matrix @ dphi - jacobian.T @ solve_spd(mobility, jacobian @ dphi))
+    torque = -gain * (mass_matrix @ dphi - jacobian.T @ solve_spd(mobility, jacobian @ dphi))
+    return Contribution(torque, cs.SX(0), -cs.dot(dphi, torque))

@@ -11,7 +11,7 @@ import casadi as cs
 
 from passiflex.control.gravity import AbstractGravity, RobotGravity
 from passiflex.control.law import AbstractLaw
-from passiflex.control.null_space import inverse_cartesian_inertia, null_space_torque
+from passiflex.control.null_space import inverse_cartesian_inertia, null_space_contribution
 from passiflex.control.signals import Command, LawEnergy, Measurement, Reference
 from passiflex.control.task import AbstractTask, PoseTask
 from passiflex.layout import Field, Layout
@@ -69,8 +69,8 @@ class RigidImpedanceLaw(AbstractLaw):
         mobility = inverse_cartesian_inertia(M, J, g.regularisation)
 
         wanted = solve_spd(g.target_inertia, y.F_e[rows] - g.damping @ dx - spring.gradient[rows]) - bias
-        damped = -null_space_torque(M, J, g.null_space_damping, dq, g.regularisation)
-        tau_m = J.T @ solve_spd(mobility, wanted) + arm.bias_torque(q, dq, m) - J_full.T @ y.F_e - damped
+        null = null_space_contribution(M, J, g.null_space_damping, dq, g.regularisation)
+        tau_m = J.T @ solve_spd(mobility, wanted) + arm.bias_torque(q, dq, m) - J_full.T @ y.F_e + null.torque
 
         stretch = dq - y.dq
         energy = LawEnergy(
@@ -80,7 +80,7 @@ class RigidImpedanceLaw(AbstractLaw):
             gravity_storage=-arm.potential_energy(q, m),
             joint_damping=cs.dot(stretch, m.joint_damping * stretch),
             cartesian_damping=cs.dot(dx, g.damping @ dx),
-            null_space_damping=cs.dot(dq, damped),
+            null_space_damping=null.dissipation,
             reference_power=cs.dot(spring.reference_gradient, reference.velocity),
         )
         return Command(tau_m, tau_m, q, dq, energy)

@@ -40,6 +40,21 @@ class Reference(NamedTuple):
     velocity: cs.SX
 
 
+class Contribution(NamedTuple):
+    """What one element of a law gives to the shaped motors, and what it stores and dissipates by it.
+
+    Attributes
+    ----------
+    torque: On the shaped motors, (n,) N m.
+    storage: [J]; the torque's conservative part is its negative gradient in φ.
+    dissipation: [W], ≥ 0: what the torque's other part takes out.
+    """
+
+    torque: cs.SX
+    storage: cs.SX
+    dissipation: cs.SX
+
+
 class LawEnergy(NamedTuple):
     """What a law claims to store [J] and to dissipate [W]; the claims hold if its model is right.
 

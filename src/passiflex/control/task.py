@@ -8,6 +8,7 @@ from typing import ClassVar, NamedTuple
 
 import casadi as cs
 
+from passiflex.control.signals import Contribution
 from passiflex.robots.arm import EndEffectorPose
 
 
@@ -37,6 +38,13 @@ def manifold_gradient(potential: cs.SX, position: cs.SX, rotation: cs.SX) -> cs.
     return cs.vertcat(cs.gradient(potential, position), torque)
 
 
+class Impedance(NamedTuple):
+    """The Cartesian spring and damper of (12) together: what they contribute, and how the reference feels it."""
+
+    contribution: Contribution
+    reference_gradient: cs.SX
+
+
 class AbstractTask(abc.ABC):
     """Which part of the pose the spring and the damper act on.
 
@@ -60,6 +68,25 @@ class AbstractTask(abc.ABC):
             "U", [p, R, p_d, R_d, K], [U, manifold_gradient(U, p, R), manifold_gradient(U, p_d, R_d)]
         )
         return Spring(*f(pose.position, pose.rotation, desired.position, desired.rotation, stiffness))
+
+    def impedance(
+        self,
+        pose: EndEffectorPose,
+        desired: EndEffectorPose,
+        jacobian: cs.SX,
+        velocity: cs.SX,
+        stiffness: cs.SX,
+        damping: cs.SX,
+    ) -> Impedance:
+        """Return −Jᵀ ∂U/∂x − Jᵀ D_x ẋ of (12), with the storage U and the dissipation ẋᵀ D_x ẋ.
+
+        `jacobian` is J(φ) (size, n) and `velocity` ẋ = J(φ) φ̇ (size,): the damper uses the geometric
+        Jacobian, and dissipates whatever the orientation error.
+        """
+        spring = self.spring(pose, desired, stiffness)
+        torque = -jacobian.T @ (spring.gradient[: self.size] + damping @ velocity)
+        dissipation = cs.dot(velocity, damping @ velocity)
+        return Impedance(Contribution(torque, spring.potential, dissipation), spring.reference_gradient)
 
 
 @dataclass(frozen=True)
