@@ -47,10 +47,6 @@ class Layout:
     def __add__(self, other: Layout) -> Layout:
         return Layout(self.fields + other.fields)
 
-    def prefixed(self, prefix: str) -> Layout:
-        """Return the same layout with every name preceded by `prefix`."""
-        return Layout(tuple(f._replace(name=prefix + f.name) for f in self.fields))
-
     @cached_property
     def slices(self) -> dict[str, slice]:
         """Return name → slice of the flat vector."""
