@@ -40,7 +40,7 @@ def target_residual(law: RigidImpedanceLaw) -> cs.Function:
     model, m = law.robot.layout.symbols("m")
     gains, g = law.layout.symbols("g")
     desired = EndEffectorPose(p_d, R_d)
-    y = Measurement(q, q, dq, dq, cs.SX.zeros(n), F_e)
+    y = Measurement(q, q, dq, dq, cs.SX.zeros(n), F_e, cs.SX.zeros(n))
     tau = law.command(y, Reference(desired, cs.SX.zeros(6)), m, g).tau_m
     M, coriolis, gravity = arm.mass_matrix(q, m), arm.coriolis_torque(q, dq, m), arm.gravity_torque(q, m)
     J = arm.jacobian(q, m)

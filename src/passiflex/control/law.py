@@ -13,7 +13,7 @@ import casadi as cs
 from passiflex.control.gravity import AbstractGravity, RobotGravity
 from passiflex.control.inner_loop import motor_torque, shaped_damping, shaped_motion
 from passiflex.control.null_space import null_space_contribution
-from passiflex.control.signals import Command, LawEnergy, Measurement, Reference
+from passiflex.control.signals import Command, LawEnergy, Measurement, Reference, Stored
 from passiflex.control.task import AbstractTask, PoseTask
 from passiflex.layout import Field, Layout
 from passiflex.robots.flexible import FlexibleJointRobot
@@ -39,9 +39,21 @@ class AbstractLaw(abc.ABC):
 
     @abc.abstractmethod
     def command(
-        self, y: Measurement, reference: Reference, m: SimpleNamespace, g: SimpleNamespace
+        self,
+        y: Measurement,
+        reference: Reference,
+        m: SimpleNamespace,
+        g: SimpleNamespace,
+        added: cs.SX | float = 0.0,
     ) -> Command:
-        """Return the motor torque and the energy that the law claims, for the model m and gains g."""
+        """Return the motor torque and the energy that the law claims, for the model m and gains g.
+
+        `added` is a torque on the shaped motors from outside the law (n,) N m, which it does not account for.
+        """
+
+    @abc.abstractmethod
+    def stored(self, y: Measurement, m: SimpleNamespace, g: SimpleNamespace) -> Stored:
+        """Return the shaped motors and what they store beside the Cartesian spring."""
 
 
 @final
@@ -74,8 +86,21 @@ class ImpedanceLaw(AbstractLaw):
             )
         )
 
+    def stored(self, y: Measurement, m: SimpleNamespace, g: SimpleNamespace) -> Stored:
+        """Return φ, φ̇ of (11), f(φ), and (14) without links and Cartesian spring."""
+        arm, K_e = self.robot.arm, g.shaped_stiffness
+        phi, dphi = shaped_motion(y.q, y.theta, y.dq, y.dtheta, m.joint_stiffness, K_e)
+        motors, springs = _shaped_energies(phi, dphi, y.q, g)
+        weight = self.gravity.compensation(arm, phi, K_e, m).storage
+        return Stored(phi, dphi, arm.pose(phi, m), motors + springs + weight)
+
     def command(
-        self, y: Measurement, reference: Reference, m: SimpleNamespace, g: SimpleNamespace
+        self,
+        y: Measurement,
+        reference: Reference,
+        m: SimpleNamespace,
+        g: SimpleNamespace,
+        added: cs.SX | float = 0.0,
     ) -> Command:
         """Return τ_m of (5) and the energies of (14) and (36)."""
         arm, rows = self.robot.arm, slice(0, self.task.size)
@@ -90,15 +115,15 @@ class ImpedanceLaw(AbstractLaw):
         spring_damper = impedance.contribution  # (12)
         weight = self.gravity.compensation(arm, phi, K_e, m)
         null = null_space_contribution(M, J_q[rows, :], g.null_space_damping, dphi, g.regularisation)  # (32)
-        tau_u = spring_damper.torque + weight.torque + null.torque
+        tau_u = spring_damper.torque + weight.torque + null.torque + added
 
-        tau_e = J_q.T @ y.F_e
-        expected = solve_spd(M, y.tau_a + tau_e - arm.bias_torque(y.q, y.dq, m))
+        expected = solve_spd(M, y.tau_a + y.tau_e - arm.bias_torque(y.q, y.dq, m))
         tau_m = motor_torque(expected, y.tau_a, tau_u, K, B, K_e, B_e)  # (5)
         stretch = dphi - y.dq
+        motors, springs = _shaped_energies(phi, dphi, y.q, g)
         energy = LawEnergy(
-            motor_kinetic=cs.dot(dphi, B_e * dphi) / 2,
-            joint_spring=cs.dot(phi - y.q, K_e * (phi - y.q)) / 2,
+            motor_kinetic=motors,
+            joint_spring=springs,
             cartesian_spring=spring_damper.storage,
             gravity_storage=weight.storage,
             joint_damping=cs.dot(stretch, D_e * stretch),
@@ -107,3 +132,9 @@ class ImpedanceLaw(AbstractLaw):
             reference_power=cs.dot(impedance.reference_gradient, reference.velocity),  # (21)
         )
         return Command(tau_m, tau_u, phi, dphi, energy)
+
+
+def _shaped_energies(phi: cs.SX, dphi: cs.SX, q: cs.SX, g: SimpleNamespace) -> tuple[cs.SX, cs.SX]:
+    """Return ½ φ̇ᵀ B_e φ̇ and ½ (φ − q)ᵀ K_e (φ − q) [J]."""
+    stretch = phi - q
+    return cs.dot(dphi, g.shaped_inertia * dphi) / 2, cs.dot(stretch, g.shaped_stiffness * stretch) / 2

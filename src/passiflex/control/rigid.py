@@ -12,7 +12,7 @@ import casadi as cs
 from passiflex.control.gravity import AbstractGravity, RobotGravity
 from passiflex.control.law import AbstractLaw
 from passiflex.control.null_space import inverse_cartesian_inertia, null_space_contribution
-from passiflex.control.signals import Command, LawEnergy, Measurement, Reference
+from passiflex.control.signals import Command, LawEnergy, Measurement, Reference, Stored
 from passiflex.control.task import AbstractTask, PoseTask
 from passiflex.layout import Field, Layout
 from passiflex.robots.flexible import FlexibleJointRobot
@@ -54,8 +54,19 @@ class RigidImpedanceLaw(AbstractLaw):
             )
         )
 
+    def stored(self, y: Measurement, m: SimpleNamespace, g: SimpleNamespace) -> Stored:
+        """Return the real motors as they are measured, with what they and the real joints store."""
+        arm, q, dq = self.robot.arm, y.theta, y.dtheta
+        motors, springs = _joint_energies(y, m)
+        return Stored(q, dq, arm.pose(q, m), motors + springs - arm.potential_energy(q, m))
+
     def command(
-        self, y: Measurement, reference: Reference, m: SimpleNamespace, g: SimpleNamespace
+        self,
+        y: Measurement,
+        reference: Reference,
+        m: SimpleNamespace,
+        g: SimpleNamespace,
+        added: cs.SX | float = 0.0,
     ) -> Command:
         """Return the torque of the rigid law, with U and its damping as the claimed energies."""
         arm, rows = self.robot.arm, slice(0, self.task.size)
@@ -70,12 +81,19 @@ class RigidImpedanceLaw(AbstractLaw):
 
         wanted = solve_spd(g.target_inertia, y.F_e[rows] - g.damping @ dx - spring.gradient[rows]) - bias
         null = null_space_contribution(M, J, g.null_space_damping, dq, g.regularisation)
-        tau_m = J.T @ solve_spd(mobility, wanted) + arm.bias_torque(q, dq, m) - J_full.T @ y.F_e + null.torque
+        tau_m = (
+            J.T @ solve_spd(mobility, wanted)
+            + arm.bias_torque(q, dq, m)
+            - J_full.T @ y.F_e
+            + null.torque
+            + added
+        )
 
         stretch = dq - y.dq
+        motors, springs = _joint_energies(y, m)
         energy = LawEnergy(
-            motor_kinetic=cs.dot(dq, m.motor_inertia * dq) / 2,
-            joint_spring=cs.dot(q - y.q, m.joint_stiffness * (q - y.q)) / 2,
+            motor_kinetic=motors,
+            joint_spring=springs,
             cartesian_spring=spring.potential,
             gravity_storage=-arm.potential_energy(q, m),
             joint_damping=cs.dot(stretch, m.joint_damping * stretch),
@@ -84,3 +102,9 @@ class RigidImpedanceLaw(AbstractLaw):
             reference_power=cs.dot(spring.reference_gradient, reference.velocity),
         )
         return Command(tau_m, tau_m, q, dq, energy)
+
+
+def _joint_energies(y: Measurement, m: SimpleNamespace) -> tuple[cs.SX, cs.SX]:
+    """Return ½ θ̇ᵀ B θ̇ and ½ (θ − q)ᵀ K (θ − q) [J]."""
+    stretch = y.theta - y.q
+    return cs.dot(y.dtheta, m.motor_inertia * y.dtheta) / 2, cs.dot(stretch, m.joint_stiffness * stretch) / 2

@@ -17,6 +17,7 @@ class Measurement(NamedTuple):
     q, theta, dq, dtheta: Link and motor positions and velocities, (n,).
     tau_a: Torque through the joints, positive on the links, (n,) N m.
     F_e: Wrench on the end effector, world axes, linear part first, (6,) N and N m.
+    tau_e: The same as joint torque, (n,) N m; by itself if it was observed and no wrench was measured.
     """
 
     q: cs.SX
@@ -25,6 +26,7 @@ class Measurement(NamedTuple):
     dtheta: cs.SX
     tau_a: cs.SX
     F_e: cs.SX
+    tau_e: cs.SX
 
 
 class Reference(NamedTuple):
@@ -81,6 +83,22 @@ class LawEnergy(NamedTuple):
     def dissipated_power(self) -> cs.SX:
         """Return P_D of (20), with the null space (36) [W]."""
         return self.joint_damping + self.cartesian_damping + self.null_space_damping
+
+
+class Stored(NamedTuple):
+    """Where a law sees its shaped motors, and what it stores beside the Cartesian spring [J].
+
+    Attributes
+    ----------
+    phi, dphi: Shaped motor coordinate of (11), (n,).
+    pose: f(φ), where the Cartesian spring takes hold.
+    energy: ½ φ̇ᵀ B_e φ̇ + ½ (φ − q)ᵀ K_e (φ − q) − V_γ(φ).
+    """
+
+    phi: cs.SX
+    dphi: cs.SX
+    pose: EndEffectorPose
+    energy: cs.SX
 
 
 class Command(NamedTuple):
