@@ -85,7 +85,7 @@ class FixedStep:
         if self._entry is not None:
             self._routine = self._entry.routine("passiflex_rk4", _RK4)
         else:
-            self._step = NativeFunction(_step_function(rhs))
+            self._step = NativeFunction(step_function(rhs))
 
     def advance(
         self,
@@ -235,7 +235,7 @@ def _column(name: str, value: ArrayLike, size: int) -> NDArray[np.float64]:
     return column
 
 
-def _step_function(rhs: cs.Function) -> cs.Function:
+def step_function(rhs: cs.Function) -> cs.Function:
     """Return one Runge-Kutta 4 step (y, u, p, h) → y_next of the extended state, as in `fixed_step.c`."""
     n_x = rhs.size1_in(0)
     y = cs.MX.sym("y", n_x + rhs.size1_out(1))

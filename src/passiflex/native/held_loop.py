@@ -1,0 +1,272 @@
+"""A sampled loop in native code: a controller once per period, a plant under held commands between."""
+
+from __future__ import annotations
+
+import ctypes
+import math
+from pathlib import Path
+from typing import NamedTuple
+
+import casadi as cs
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from passiflex.errors import SizeError, ValueRangeError
+from passiflex.native.entry import Entry, address
+from passiflex.native.fixed_step import step_function
+from passiflex.native.function import NativeFunction
+from passiflex.native.library import c_source
+
+Array = NDArray[np.float64]
+
+HELD_LOOP_DRIVER = c_source("held_loop.c")
+"""The C text that `compile_functions` must append to a library that `HeldLoop` is to use."""
+
+LONGEST_LINE = 64
+"""Commands that may be on their way at one time."""
+TOGETHER = 1e-9
+"""Two instants closer than this share of a period are one."""
+
+
+class _Callable(ctypes.Structure):
+    _fields_ = (
+        ("function", ctypes.c_void_p),
+        ("memory", ctypes.c_int),
+        *((name, ctypes.c_void_p) for name in ("arg", "res", "iw", "w")),
+    )
+
+
+_ROUTINE = [
+    *[ctypes.c_void_p] * 11, *[ctypes.c_longlong] * 2, *[ctypes.c_double] * 2, ctypes.c_longlong,
+    *[ctypes.c_void_p] * 2,
+]  # fmt: skip
+
+
+class LoopState(NamedTuple):
+    """Everything that goes from one call to the next.
+
+    Attributes
+    ----------
+    x: State of the plant.
+    quads: Its quadratures (energies) since the start.
+    controller: State of the controller.
+    line: Commands on their way, as `held_loop.c` has them.
+    signals: What the controller said last.
+    """
+
+    x: Array
+    quads: Array
+    controller: Array
+    line: Array
+    signals: Array
+
+
+class Samples(NamedTuple):
+    """Recorded samples, each taken after the controller ran.
+
+    `completed` below the number of rows is the sample at which a number ceased to be finite; rows that
+    were not reached are NaN.
+    """
+
+    x: Array
+    quads: Array
+    controller: Array
+    command: Array
+    signals: Array
+    completed: int
+    state: LoopState
+
+
+class HeldLoop:
+    """Advances control(x, c, row, p) → (c, command, signals) and plant(x, [command, surroundings], p) → (dx, dquad).
+
+    The first numbers of a row are the surroundings that the plant feels. Threads may share the object if
+    it is compiled.
+
+    Parameters
+    ----------
+    plant, control: The two functions; all inputs and outputs are columns.
+    library: What `compile_functions([plant, control, …], driver=HELD_LOOP_DRIVER)` returned; None runs
+        CasADi's virtual machine.
+    """
+
+    def __init__(self, plant: cs.Function, control: cs.Function, library: Path | None = None):
+        self.n_x, inputs, self.n_p = (plant.size1_in(i) for i in range(3))
+        _, self.n_c, self.n_w, self.n_p_control = (control.size1_in(i) for i in range(4))
+        self.n_q, self.n_u, self.n_z = plant.size1_out(1), control.size1_out(1), control.size1_out(2)
+        self.n_s = inputs - self.n_u
+        if control.size1_in(0) != self.n_x or not 0 <= self.n_s <= self.n_w:
+            raise SizeError(
+                "plant and control do not fit", got=f"{plant}, {control}", needs="the loop of `held_loop.c`"
+            )
+        self._plant = Entry(library, plant.name()) if library is not None else None
+        self._control = Entry(library, control.name()) if library is not None else None
+        if self._plant is not None:
+            self._routine = self._plant.routine("passiflex_held_loop", _ROUTINE)
+        else:
+            self._step, self._law = NativeFunction(step_function(plant)), NativeFunction(control)
+
+    def start(self, x: ArrayLike, controller: ArrayLike, command: ArrayLike) -> LoopState:
+        """Return the state before the first sample, with `command` in force."""
+        line = np.zeros(1 + self.n_u + LONGEST_LINE * (1 + self.n_u))
+        line[1 : 1 + self.n_u] = _column("command", command, self.n_u)
+        return LoopState(
+            _column("x", x, self.n_x),
+            np.zeros(self.n_q),
+            _column("c", controller, self.n_c),
+            line,
+            np.full(self.n_z, np.nan),
+        )
+
+    def advance(
+        self,
+        state: LoopState,
+        rows: ArrayLike,
+        timing: ArrayLike,
+        p_plant: ArrayLike,
+        p_control: ArrayLike,
+        period: float,
+        longest: float,
+        record_every: int = 1,
+        *,
+        last: bool = False,
+    ) -> Samples:
+        """Return the samples of the rows, and the state after them.
+
+        Parameters
+        ----------
+        state: From `start`, or from the call before.
+        rows: Inputs (N, n_w); row i holds during period i.
+        timing: (N, 2): delay of the command of each sample [s] ≥ 0, and whether the controller runs (0, 1).
+        period: [s].
+        longest: Longest step of the plant [s].
+        record_every: Samples from one recorded to the next.
+        last: True if the last row is a sample only, with no period after it.
+
+        Raises
+        ------
+        SizeError, ValueRangeError
+            For an argument of the wrong shape or outside its range.
+        """
+        rows = np.ascontiguousarray(rows, dtype=float)
+        timing = np.ascontiguousarray(timing, dtype=float)
+        if rows.ndim != 2 or rows.shape[1] != self.n_w:
+            raise SizeError("rows", got=rows.shape, needs=f"shape (samples, {self.n_w})")
+        if timing.shape != (len(rows), 2):
+            raise SizeError("timing", got=timing.shape, needs=f"shape ({len(rows)}, 2)")
+        for name, value in (("period", period), ("longest", longest)):
+            if not (value > 0 and math.isfinite(value)):
+                raise ValueRangeError(name, got=value, needs="a positive time in s")
+        if record_every < 1:
+            raise ValueRangeError("record_every", got=record_every, needs="a whole number, at least 1")
+        if timing.size and not 0 <= timing[:, 0].min() <= timing[:, 0].max() < (LONGEST_LINE - 2) * period:
+            raise ValueRangeError(
+                "delay of a command",
+                got=f"{timing[:, 0].min()} to {timing[:, 0].max()} s",
+                needs=f"0 to {LONGEST_LINE - 3} periods",
+            )
+        p_plant, p_control = (
+            _column("p_plant", p_plant, self.n_p),
+            _column("p_control", p_control, self.n_p_control),
+        )
+        width = self.n_x + self.n_q + self.n_c + self.n_u + self.n_z
+        out = np.full((-(-len(rows) // record_every), width), np.nan)
+        y = np.concatenate([state.x, state.quads])
+        c, line, z = state.controller.copy(), state.line.copy(), state.signals.copy()
+        run = self._in_machine if self._plant is None else self._in_c
+        steps = len(rows) - last
+        completed = run(
+            y, c, line, z, rows, timing, p_plant, p_control, steps, period, longest, record_every, out
+        )
+        x, quads, memory, command, signals = np.split(
+            out, np.cumsum([self.n_x, self.n_q, self.n_c, self.n_u]), axis=1
+        )
+        return Samples(
+            x, quads, memory, command, signals, completed, LoopState(y[: self.n_x], y[self.n_x :], c, line, z)
+        )
+
+    def _in_c(
+        self,
+        y: Array,
+        c: Array,
+        line: Array,
+        z: Array,
+        rows: Array,
+        timing: Array,
+        p_plant: Array,
+        p_control: Array,
+        steps: int,
+        period: float,
+        longest: float,
+        record_every: int,
+        out: Array,
+    ) -> int:
+        assert self._plant is not None
+        assert self._control is not None
+        kept = [entry.work() for entry in (self._plant, self._control)]
+        callables = [
+            _Callable(
+                e.address, e.memory, ctypes.addressof(arg), ctypes.addressof(res), address(iw), address(w)
+            )
+            for e, (arg, res, iw, w) in zip((self._plant, self._control), kept, strict=True)
+        ]
+        sizes = np.array([self.n_x, self.n_q, self.n_c, self.n_u, self.n_w, self.n_s, self.n_z], np.int64)
+        n = self.n_x + self.n_q
+        scratch = np.full(self.n_c + 2 * self.n_u + self.n_s + 3 * n, np.nan)
+        arrays = (sizes, y, c, line, z, rows, timing, p_plant, p_control)
+        return self._routine(
+            *(ctypes.addressof(e) for e in callables), *map(address, arrays),
+            len(rows), steps, period, longest, record_every, address(out), address(scratch),
+        )  # fmt: skip
+
+    def _in_machine(
+        self,
+        y: Array,
+        c: Array,
+        line: Array,
+        z: Array,
+        rows: Array,
+        timing: Array,
+        p_plant: Array,
+        p_control: Array,
+        steps: int,
+        period: float,
+        longest: float,
+        record_every: int,
+        out: Array,
+    ) -> int:
+        held, queue = line[1 : 1 + self.n_u], line[1 + self.n_u :].reshape(LONGEST_LINE, 1 + self.n_u)
+        for k, (row, (delay, runs)) in enumerate(zip(rows, timing, strict=True)):
+            if runs:
+                waiting = int(line[0])
+                c[:], command, z[:] = self._law(y[: self.n_x], c, row, p_control)
+                queue[waiting, 0] = max(delay, queue[waiting - 1, 0] if waiting else 0.0)
+                queue[waiting, 1:] = command
+                line[0] += 1
+            t = 0.0
+            while True:
+                while line[0] and queue[0, 0] <= t + TOGETHER * period:
+                    held[:] = queue[0, 1:]
+                    queue[:-1] = queue[1:].copy()
+                    line[0] -= 1
+                if t == 0.0 and k % record_every == 0:
+                    out[k // record_every] = np.concatenate([y, c, held, z])
+                if k >= steps or t >= period:
+                    break
+                until = min(queue[0, 0], period) if line[0] else period
+                count = max(1, math.ceil((until - t) / longest * (1 - 1e-12)))
+                inputs = np.concatenate([held, row[: self.n_s]])
+                for _ in range(count):
+                    y[:] = self._step(y, inputs, p_plant, (until - t) / count)
+                t = until
+            queue[: int(line[0]), 0] -= period
+            if not np.isfinite(y).all():
+                return k
+        return len(rows)
+
+
+def _column(name: str, value: ArrayLike, size: int) -> Array:
+    column = np.array(value, dtype=float).ravel()
+    if column.shape != (size,):
+        raise SizeError(name, got=column.shape, needs=f"shape {(size,)}")
+    return column
