@@ -15,6 +15,7 @@ ROOMS = (
     "robots",
     "phs",
     "control",
+    "sampled",
     "native",
     "simulation",
     "passivity",

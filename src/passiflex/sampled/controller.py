@@ -1,0 +1,243 @@
+"""One control period: step(measurement, wish, elapsed, state, parameters) → (command, state, ledger entry)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from types import SimpleNamespace
+from typing import NamedTuple, final
+
+import casadi as cs
+
+from passiflex.control.law import AbstractLaw, Stored
+from passiflex.control.signals import Measurement, Reference
+from passiflex.layout import Field, Layout
+from passiflex.robots.arm import EndEffectorPose
+from passiflex.sampled.actions import action_layout, posture_spring, tracking_wrench
+from passiflex.sampled.external import AbstractExternalTorque, Known, TrueTorque
+from passiflex.sampled.governor import govern_pose, govern_stiffness
+from passiflex.sampled.signals import ControlParameters, LedgerEntry, Step, Wish
+from passiflex.sampled.tank import AbstractTank, PeriodFlows, TankEntry, added, finite, unchanged
+
+
+class _Granted(NamedTuple):
+    """The reference and stiffness in force, with what they cost."""
+
+    pose: EndEffectorPose
+    stiffness: cs.SX
+    pose_share: cs.SX
+    stiffness_share: cs.SX
+    cost: cs.SX
+    entry: TankEntry
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class SampledController:
+    """A law with its tank, governor, gated actions and fallback, once per period.
+
+    In this order, within one period: the tank settles what the period before took or gave; if it is
+    overdrawn by then, the law falls back for good; the governor grants what the tank can pay of the new
+    reference; the valve opens as far as the level allows; the law commands. Without a tank nothing is
+    governed or gated, and the port's energy is only counted.
+    """
+
+    law: AbstractLaw
+    tank: AbstractTank | None = None
+    external: AbstractExternalTorque = field(default_factory=TrueTorque)
+
+    @cached_property
+    def parameters(self) -> tuple[Layout, ...]:
+        """Return the layouts of `ControlParameters`, in its order."""
+        robot, gains = self.law.robot, self.law.layout
+        observer = Layout((Field("bandwidth", (), "rad/s", "of the external torque's estimator"),))
+        return robot.layout, gains, gains, AbstractTank.layout, action_layout(robot.n), observer
+
+    @cached_property
+    def state(self) -> Layout:
+        """Return what is remembered from one period to the next; energies are sums since the start."""
+        n, k = self.law.robot.n, self.law.task.size
+        return Layout(
+            (
+                Field("governed_position", (3,), "m", "x̂_d, the reference in force"),
+                Field("governed_rotation", (3, 3), "1", "its axes"),
+                Field("held_stiffness", (k, k), "N/m, N, N m/rad", "K_x in force"),
+                Field("tank_energy", (), "J", "T"),
+                Field("law_storage", (), "J", "S after the last change of the reference"),
+                Field("variable_potential", (), "J", "U(K_x) − U(K_base)"),
+                Field("claimed_power", (), "W", "P_D that the law claims"),
+                Field("claimed_cartesian_power", (), "W", "its part in D_x"),
+                Field("last_q", (n,), "rad", "measured q of the last period"),
+                Field("last_tau_a", (n,), "N m", "measured τ_a of the last period"),
+                Field("last_command", (n,), "N m", "τ_m of the last period"),
+                Field("running", (), "1", "0 before the first period"),
+                Field("latched", (), "1", "1 once the law has fallen back"),
+                Field("measured_port_energy", (), "J", "Σ w"),
+                Field("reference_energy", (), "J", "Σ ΔU: stored by changes of reference and stiffness"),
+                Field("granted_energy", (), "J", "paid for changes of reference and stiffness"),
+                Field("drawn_energy", (), "J", "taken from the tank by the port"),
+                Field("refilled_energy", (), "J", "given to the tank"),
+                Field("spilled_energy", (), "J", "refused by the cap"),
+                Field("lowest_level", (), "J", "least T so far"),
+                Field("governed_time", (), "s", "in which the reference was held back"),
+                Field("faults", (), "1", "periods with a measurement that was not finite"),
+            )
+        ) + self.external.state(n)
+
+    def step(self, y: Measurement, wish: Wish, elapsed: cs.SX, state: cs.SX, p: ControlParameters) -> Step:
+        """Return command, next state and ledger entry, `elapsed` seconds after the last period that ran."""
+        arm, s = self.law.robot.arm, self.state.view(state)
+        ok = finite(*y, wish.pose.position, wish.pose.rotation, wish.stiffness, wish.damping, wish.wrench)
+        y, observed = self.external.estimate(y, elapsed, Known(arm, p.m, p.observer.bandwidth), s)
+        first = s.running < 1
+
+        held = EndEffectorPose(s.governed_position, s.governed_rotation)
+        before = self.law.stored(y, p.m, _chosen(s.latched, p.fallback, p.g))
+        storage = before.energy + self._potential(before, held, s.held_stiffness)
+        variable = self._potential(before, held, s.held_stiffness - p.g.stiffness)
+        work = cs.if_else(first, 0, cs.dot(s.last_tau_a + y.tau_a, y.q - s.last_q) / 2)
+        flows = PeriodFlows(
+            elapsed=elapsed,
+            port_energy=work,
+            storage_change=cs.if_else(first, 0, storage - s.law_storage),
+            claimed_loss=s.claimed_power * elapsed,
+            claimed_cartesian_loss=s.claimed_cartesian_power * elapsed,
+            variable_spring_work=cs.if_else(first, 0, variable - s.variable_potential),
+        )
+        settled = self.tank.settle(s.tank_energy, flows, p.tank) if self.tank else unchanged(s.tank_energy)
+
+        # Fall back in the period in which it shows, and keep T + S.
+        falls = self.tank is not None and self.tank.falls_back
+        overdrawn = cs.logic_and(settled.level < p.tank.tank_trip, s.latched < 1) if falls else cs.SX(0)
+        latched = cs.fmax(s.latched, overdrawn)
+        g = _chosen(latched, p.fallback, p.g)
+        now = self.law.stored(y, p.m, g)
+        held = _pose(overdrawn, now.pose, held)
+        held_stiffness = cs.if_else(overdrawn, p.fallback.stiffness, s.held_stiffness)
+        restored = cs.if_else(overdrawn, now.energy, storage)  # the spring is slack at the pose just read
+        settled = settled._replace(level=settled.level + storage - restored)
+
+        granted = self._grant(now, held, held_stiffness, wish, latched, settled.level, elapsed, p)
+        valve = (1 - latched) * self.tank.valve(granted.entry.level, p.tank) if self.tank else cs.SX(1)
+        g.stiffness, g.damping = granted.stiffness, cs.if_else(latched, p.fallback.damping, wish.damping)
+        torque = valve * self._actions(y, now, wish, granted, g.damping, p, g.regularisation)
+        if self.tank:
+            brake = self.tank.braking(granted.entry.level, cs.dot(now.dphi, now.dphi), elapsed, p.tank)
+            torque -= brake * now.dphi
+        command = self.law.command(y, Reference(granted.pose, wish.velocity), p.m, g, torque)
+
+        tank = added(settled, granted.entry)
+        held_back = cs.logic_or(granted.pose_share < 1, granted.stiffness_share < 1)
+        values = {
+            "governed_position": granted.pose.position,
+            "governed_rotation": granted.pose.rotation,
+            "held_stiffness": granted.stiffness,
+            "tank_energy": tank.level,
+            "law_storage": restored + granted.cost,
+            "variable_potential": self._potential(now, granted.pose, granted.stiffness - p.g.stiffness),
+            "claimed_power": command.energy.dissipated_power,
+            "claimed_cartesian_power": command.energy.cartesian_damping,
+            "last_q": y.q,
+            "last_tau_a": y.tau_a,
+            "last_command": command.tau_m,
+            "running": 1,
+            "latched": latched,
+            "measured_port_energy": s.measured_port_energy + work,
+            "reference_energy": s.reference_energy + granted.cost,
+            "granted_energy": s.granted_energy + tank.granted,
+            "drawn_energy": s.drawn_energy + tank.drawn,
+            "refilled_energy": s.refilled_energy + tank.refilled,
+            "spilled_energy": s.spilled_energy + tank.spilled,
+            "lowest_level": cs.fmin(s.lowest_level, tank.level),
+            "governed_time": s.governed_time + cs.if_else(held_back, elapsed, 0),
+            "faults": s.faults + tank.fault,
+        }
+        own = Layout(self.state.fields[: len(values)])
+        after = cs.vertcat(own.stack(values), observed)
+        faulty = self.state.stack(vars(s) | {"faults": s.faults + 1})
+        entry = LedgerEntry(
+            tank=tank,
+            port_energy=work,
+            storage=restored + granted.cost,
+            reference_share=granted.pose_share,
+            stiffness_share=granted.stiffness_share,
+            valve=valve,
+            latched=latched,
+            fault=1 - ok,
+        )
+        safe = command._replace(tau_m=cs.if_else(ok, command.tau_m, s.last_command))
+        return Step(safe, cs.if_else(ok, after, faulty), entry, y)
+
+    def _potential(self, at: Stored, reference: EndEffectorPose, stiffness: cs.SX) -> cs.SX:
+        return self.law.task.potential(at.pose, reference, stiffness)
+
+    def _grant(
+        self,
+        now: Stored,
+        held: EndEffectorPose,
+        held_stiffness: cs.SX,
+        wish: Wish,
+        latched: cs.SX,
+        level: cs.SX,
+        elapsed: cs.SX,
+        p: ControlParameters,
+    ) -> _Granted:
+        """Return the reference as far as the tank pays for it; a law that has fallen back holds its own."""
+        one = cs.SX(1)
+        if self.tank is None:
+            stored = self._potential(now, wish.pose, wish.stiffness)
+            cost = stored - self._potential(now, held, held_stiffness)
+            return _Granted(wish.pose, wish.stiffness, one, one, cost, unchanged(level))
+        task, tank = self.law.task, self.tank
+        share = tank.stiffness_share(level, p.tank)
+        wanted = cs.if_else(
+            share < 1, p.g.stiffness + share * (wish.stiffness - p.g.stiffness), wish.stiffness
+        )
+        wanted = cs.if_else(latched, held_stiffness, wanted)
+        signed = p.tank.tank_signed
+        budget = tank.budget(level, elapsed, p.tank)
+        stiffness = govern_stiffness(task, now.pose, held, held_stiffness, wanted, budget, signed)
+        first = tank.pay(level, stiffness.cost, p.tank)
+        budget = cs.fmax(budget - first.granted, 0)
+        goal = _pose(latched, held, wish.pose)
+        pose = govern_pose(task, now.pose, held, goal, stiffness.value, budget, signed)
+        second = tank.pay(first.level, pose.cost, p.tank)
+        return _Granted(
+            pose=pose.value,
+            stiffness=stiffness.value,
+            pose_share=pose.share,
+            stiffness_share=stiffness.share,
+            cost=stiffness.cost + pose.cost,
+            entry=added(first, second),
+        )
+
+    def _actions(
+        self,
+        y: Measurement,
+        now: Stored,
+        wish: Wish,
+        granted: _Granted,
+        damping: cs.SX,
+        p: ControlParameters,
+        regularisation: cs.SX,
+    ) -> cs.SX:
+        """Return the torque of everything that only the tank's valve lets through (n,) N m."""
+        arm, rows = self.law.robot.arm, slice(0, self.law.task.size)
+        M, J = arm.mass_matrix(y.q, p.m), arm.jacobian(y.q, p.m)[rows, :]
+        a = p.actions
+        follow = granted.pose_share * tracking_wrench(
+            M, J, damping, wish.velocity[rows], wish.acceleration[rows], regularisation, a
+        )
+        at_end = arm.jacobian(now.phi, p.m)
+        posture = posture_spring(M, J, now.phi, a.posture_stiffness, a.posture, regularisation)
+        return at_end.T @ wish.wrench + at_end[rows, :].T @ follow + posture
+
+
+def _chosen(flag: cs.SX, then: SimpleNamespace, other: SimpleNamespace) -> SimpleNamespace:
+    return SimpleNamespace(**{k: cs.if_else(flag, v, getattr(other, k)) for k, v in vars(then).items()})
+
+
+def _pose(flag: cs.SX, then: EndEffectorPose, other: EndEffectorPose) -> EndEffectorPose:
+    return EndEffectorPose(
+        cs.if_else(flag, then.position, other.position), cs.if_else(flag, then.rotation, other.rotation)
+    )

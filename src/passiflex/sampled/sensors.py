@@ -1,0 +1,111 @@
+"""What a robot's sensors make of the truth: resolution, differences, bandwidth, noise."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import NamedTuple
+
+import casadi as cs
+
+from passiflex.control.signals import Measurement
+from passiflex.layout import Field, Layout
+
+UNFILTERED = 1e9
+"""A bandwidth [rad/s] that stands for none."""
+
+
+def quantised(value: cs.SX, resolution: cs.SX) -> cs.SX:
+    """Return the nearest multiple of the resolution; the value itself if the resolution is 0."""
+    step = cs.if_else(resolution > 0, resolution, 1)
+    return cs.if_else(resolution > 0, step * cs.floor(value / step + 0.5), value)
+
+
+def low_pass(last: cs.SX, value: cs.SX, bandwidth: cs.SX, elapsed: cs.SX) -> cs.SX:
+    """Return a first-order low-pass of pole `bandwidth` [rad/s], exact for a value held since the last sample."""
+    return cs.if_else(
+        bandwidth < UNFILTERED, last + (1 - cs.exp(-bandwidth * elapsed)) * (value - last), value
+    )
+
+
+def difference(last: cs.SX, value: cs.SX, elapsed: cs.SX) -> cs.SX:
+    """Return (value − last) / elapsed: the mean velocity of the last period, half a period late."""
+    return (value - last) / elapsed
+
+
+class Reading(NamedTuple):
+    """What the sensors say, and what they remember."""
+
+    measured: Measurement
+    state: cs.SX
+
+
+@dataclass(frozen=True)
+class Sensors:
+    """The sensors of one robot, in this order: noise, bandwidth, resolution; velocities come last.
+
+    All numbers are parameters: 0 switches a resolution off, `UNFILTERED` a bandwidth, and
+    `velocity_differences` 0 gives the true velocities. Nothing here knows what the law does.
+    """
+
+    n: int
+
+    @property
+    def layout(self) -> Layout:
+        """Return the parameters."""
+        return Layout(
+            (
+                Field("link_resolution", (), "rad", "of q"),
+                Field("motor_resolution", (), "rad", "of θ"),
+                Field("velocity_differences", (), "1", "1: q̇, θ̇ are differences of readings; 0: true"),
+                Field("velocity_bandwidth", (), "rad/s", "pole of the low-pass of the differences"),
+                Field("torque_bandwidth", (), "rad/s", "pole of the joint torque sensor"),
+                Field("wrench_bandwidth", (), "rad/s", "pole of the wrench sensor"),
+            )
+        )
+
+    @property
+    def state(self) -> Layout:
+        """Return what the sensors remember from one sample to the next."""
+        n = self.n
+        return Layout(
+            (
+                Field("started", (), "1", "0 before the first sample"),
+                Field("read_q", (n,), "rad", "last reading of q"),
+                Field("read_theta", (n,), "rad", "last reading of θ"),
+                Field("read_dq", (n,), "rad/s", "low-passed difference of q"),
+                Field("read_dtheta", (n,), "rad/s", "low-passed difference of θ"),
+                Field("read_tau_a", (n,), "N m", "low-passed τ_a"),
+                Field("read_wrench", (6,), "N, N m", "low-passed F_e"),
+            )
+        )
+
+    def read(
+        self, truth: Measurement, torque_noise: cs.SX, elapsed: cs.SX, s: SimpleNamespace, g: SimpleNamespace
+    ) -> Reading:
+        """Return the reading of the truth, `elapsed` seconds after the last one."""
+        first = s.started < 1
+        noisy = truth.tau_a + torque_noise
+        tau_a = cs.if_else(first, noisy, low_pass(s.read_tau_a, noisy, g.torque_bandwidth, elapsed))
+        F_e = cs.if_else(first, truth.F_e, low_pass(s.read_wrench, truth.F_e, g.wrench_bandwidth, elapsed))
+        q, theta = quantised(truth.q, g.link_resolution), quantised(truth.theta, g.motor_resolution)
+
+        def velocity(true: cs.SX, now: cs.SX, last: cs.SX, filtered: cs.SX) -> tuple[cs.SX, cs.SX]:
+            rate = cs.if_else(first, 0, difference(last, now, elapsed))
+            smooth = low_pass(filtered, rate, g.velocity_bandwidth, elapsed)
+            return cs.if_else(g.velocity_differences > 0, smooth, true), smooth
+
+        dq, smooth_dq = velocity(truth.dq, q, s.read_q, s.read_dq)
+        dtheta, smooth_dtheta = velocity(truth.dtheta, theta, s.read_theta, s.read_dtheta)
+        state = self.state.stack(
+            {
+                "started": 1,
+                "read_q": q,
+                "read_theta": theta,
+                "read_dq": smooth_dq,
+                "read_dtheta": smooth_dtheta,
+                "read_tau_a": tau_a,
+                "read_wrench": F_e,
+            }
+        )
+        return Reading(Measurement(q, theta, dq, dtheta, tau_a, F_e, truth.tau_e), state)

@@ -1,0 +1,84 @@
+"""What crosses the boundary of one control period."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import NamedTuple
+
+import casadi as cs
+
+from passiflex.control.signals import Command, Measurement
+from passiflex.robots.arm import EndEffectorPose
+from passiflex.sampled.tank import TankEntry
+
+
+class Wish(NamedTuple):
+    """What is asked of the controller in one period.
+
+    Attributes
+    ----------
+    pose, velocity, acceleration: x_d with its derivatives, (6,) each, world axes.
+    stiffness, damping: K_x and D_x of this period, (k, k).
+    wrench: Feed-forward wrench that the end effector is to exert, (6,) N and N m.
+    """
+
+    pose: EndEffectorPose
+    velocity: cs.SX
+    acceleration: cs.SX
+    stiffness: cs.SX
+    damping: cs.SX
+    wrench: cs.SX
+
+
+class LedgerEntry(NamedTuple):
+    """The energy of one period [J]; T + S + Σw + Σspilled is constant for the port tank.
+
+    Attributes
+    ----------
+    tank: What settled the period and what the reference was granted, as one entry.
+    port_energy: w of the period.
+    storage: S after the reference has moved.
+    reference_share, stiffness_share: γ of the governor, 1 if nothing was held back.
+    valve: β in this period.
+    latched: 1 if the law has fallen back.
+    fault: 1 if the measurement was not finite: state and command are then those of the period before.
+    """
+
+    tank: TankEntry
+    port_energy: cs.SX
+    storage: cs.SX
+    reference_share: cs.SX
+    stiffness_share: cs.SX
+    valve: cs.SX
+    latched: cs.SX
+    fault: cs.SX
+
+
+class Step(NamedTuple):
+    """Command, next state (flat) and ledger entry of one period, and the measurement as the law believed it."""
+
+    command: Command
+    state: cs.SX
+    entry: LedgerEntry
+    believed: Measurement
+
+
+class ControlParameters(NamedTuple):
+    """Views of everything that is a run-time number of the controller.
+
+    Attributes
+    ----------
+    m: The law's model, `robot.layout`.
+    g: The law's gains, `law.layout`; stiffness and damping of the period come with the wish.
+    fallback: The same layout, in force once the law has fallen back.
+    tank: `AbstractTank.layout`.
+    actions: `action_layout`.
+    observer: `bandwidth` of the external torque's estimator.
+    """
+
+    m: SimpleNamespace
+    g: SimpleNamespace
+    fallback: SimpleNamespace
+    tank: SimpleNamespace
+    actions: SimpleNamespace
+    observer: SimpleNamespace

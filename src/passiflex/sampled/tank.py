@@ -1,0 +1,150 @@
+"""What every sampled energy tank is: books in joules, kept once per control period."""
+
+from __future__ import annotations
+
+import abc
+from types import SimpleNamespace
+from typing import ClassVar, NamedTuple
+
+import casadi as cs
+
+from passiflex.control.tank import smoothstep
+from passiflex.layout import Field, Layout
+
+LARGEST = 1e100
+"""Numbers above this one, infinities and NaN are no measurements: energies are squares of what passes."""
+
+
+class PeriodFlows(NamedTuple):
+    """What happened in the control period that ends now [J], measured or claimed.
+
+    Attributes
+    ----------
+    elapsed: Time since the last period that ran [s].
+    port_energy: w = ½ (τ_a,k + τ_a,k+1)ᵀ (q_k+1 − q_k), measured: given to the links.
+    storage_change: S_k+1 − S_k at the old reference, from measured positions and velocities.
+    claimed_loss: P_D Δt, what the law's formula says was dissipated.
+    claimed_cartesian_loss: The part of it in D_x.
+    variable_spring_work: Change of U(K_x) − U(K_base) at the old reference: work done on the part of
+        the Cartesian spring that exceeds the base stiffness.
+    """
+
+    elapsed: cs.SX
+    port_energy: cs.SX
+    storage_change: cs.SX
+    claimed_loss: cs.SX
+    claimed_cartesian_loss: cs.SX
+    variable_spring_work: cs.SX
+
+
+class TankEntry(NamedTuple):
+    """One line of a tank's books [J]: level = before − granted − drawn + refilled − spilled.
+
+    Attributes
+    ----------
+    level: T after this entry.
+    granted: Paid for a change of the reference or of the stiffness.
+    drawn: Taken by whatever else gave energy: gated actions, or a loop that is active.
+    refilled: What came in, spilled or not.
+    spilled: What came in and did not fit below the cap.
+    fault: 1 if a number of the request was not finite; nothing else changed then.
+    """
+
+    level: cs.SX
+    granted: cs.SX
+    drawn: cs.SX
+    refilled: cs.SX
+    spilled: cs.SX
+    fault: cs.SX
+
+
+class AbstractTank(abc.ABC):
+    """An energy tank with levels, sampled: `settle` the period, see the `budget`, `pay`, ask the `valve`.
+
+    A tank never lifts its level for nothing, never divides by it, and knows measured quantities only.
+    """
+
+    layout: ClassVar[Layout] = Layout(
+        (
+            Field("tank_floor", (), "J", "T_min: nothing is granted below"),
+            Field("tank_low", (), "J", "T_low: the valve begins to close below"),
+            Field("tank_cap", (), "J", "T_max: more is spilled"),
+            Field("tank_power", (), "W", "P_max: most that the reference is granted"),
+            Field("tank_trip", (), "J", "below it the law falls back for good"),
+            Field("tank_signed", (), "1", "0: a change of the reference costs |ΔU|; 1: it costs ΔU"),
+            Field("tank_fill", (), "1", "α: share of the claimed loss that is credited, if any is"),
+            Field("tank_braking", (), "N m s/rad", "α_max: most damping that the tank adds, if it adds any"),
+        )
+    )
+    falls_back: ClassVar[bool] = False
+    """Whether a level below `tank_trip` means that the loop is active."""
+
+    @abc.abstractmethod
+    def settle(self, level: cs.SX, flows: PeriodFlows, g: SimpleNamespace) -> TankEntry:
+        """Return the entry for the period that ends now."""
+
+    @abc.abstractmethod
+    def pay(self, level: cs.SX, cost: cs.SX, g: SimpleNamespace) -> TankEntry:
+        """Return the entry for a change of the reference or of the stiffness that stores `cost` [J]."""
+
+    @abc.abstractmethod
+    def budget(self, level: cs.SX, elapsed: cs.SX, g: SimpleNamespace) -> cs.SX:
+        """Return what may be granted now [J], ≥ 0."""
+
+    @abc.abstractmethod
+    def braking(self, level: cs.SX, speed_squared: cs.SX, elapsed: cs.SX, g: SimpleNamespace) -> cs.SX:
+        """Return the damping [N m s/rad] that the tank adds to the motors in this period, ≥ 0."""
+
+    @abc.abstractmethod
+    def stiffness_share(self, level: cs.SX, g: SimpleNamespace) -> cs.SX:
+        """Return how much of the stiffness above the base one may act, 0..1."""
+
+    def valve(self, level: cs.SX, g: SimpleNamespace) -> cs.SX:
+        """Return β(T): 0 at T_min, 1 from T_low on."""
+        return smoothstep((level - g.tank_floor) / (g.tank_low - g.tank_floor))
+
+
+def finite(*numbers: cs.SX) -> cs.SX:
+    """Return 1 if all numbers are, else 0."""
+    flags = [cs.fabs(x) < LARGEST for number in numbers for x in cs.vertsplit(cs.vec(cs.SX(number)))]
+    result = cs.SX(1)
+    for flag in flags:
+        result = cs.logic_and(result, flag)
+    return result
+
+
+def booked(level: cs.SX, *, granted: cs.SX | float, flow: cs.SX | float, cap: cs.SX, ok: cs.SX) -> TankEntry:
+    """Return the entry that grants `granted` and takes `flow` in (out if negative), spilling what the cap refuses."""
+    zero = cs.SX(0)
+    granted, flow = cs.if_else(ok, granted, zero), cs.if_else(ok, flow, zero)
+    drawn, refilled = cs.fmax(-flow, 0), cs.fmax(flow, 0)
+    full = level - granted + flow
+    most = cs.fmax(cap, level - granted)  # what was above the cap before may stay; nothing may come to it
+    spilled = cs.fmin(cs.fmax(full - most, 0), refilled)
+    after = cs.if_else(spilled > 0, most, full)  # full − spilled, but not rounded to what came in
+    return TankEntry(after, granted, drawn, refilled, spilled, 1 - ok)
+
+
+def unchanged(level: cs.SX) -> TankEntry:
+    """Return an entry of nothing."""
+    return TankEntry(level, *(cs.SX(0) for _ in range(5)))
+
+
+def added(first: TankEntry, second: TankEntry) -> TankEntry:
+    """Return two entries in a row as one."""
+    sums = (a + b for a, b in zip(first[1:], second[1:], strict=True))
+    return TankEntry(second.level, *sums)
+
+
+def paid(level: cs.SX, cost: cs.SX, g: SimpleNamespace) -> TankEntry:
+    """Return the entry of a cost: ΔU if the tank is signed, |ΔU| as the paper has it otherwise."""
+    signed, ok = g.tank_signed > 0, finite(level, cost)
+    granted = cs.if_else(signed, cs.fmax(cost, 0), cs.fabs(cost))
+    returned = cs.if_else(signed, cs.fmax(-cost, 0), 0)
+    return booked(level, granted=granted, flow=returned, cap=g.tank_cap, ok=ok)
+
+
+def above_floor(level: cs.SX, elapsed: cs.SX, g: SimpleNamespace) -> cs.SX:
+    """Return min(T − T_min, P_max Δt), at least 0 [J]; 0 if one of the two is no number."""
+    most = cs.fmax(cs.fmin(level - g.tank_floor, g.tank_power * elapsed), 0)
+    return cs.if_else(finite(level, elapsed), most, 0)

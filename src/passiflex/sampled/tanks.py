@@ -1,0 +1,142 @@
+"""Four sampled tanks: the paper's, the one at the joint port, and two that readers know."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import ClassVar, final
+
+import casadi as cs
+
+from passiflex.sampled.tank import AbstractTank, PeriodFlows, TankEntry, above_floor, booked, finite, paid
+
+UNLIMITED = 1e9
+"""A budget [J] that stands for none."""
+
+
+@final
+class PortTank(AbstractTank):
+    """T_k+1 = T_k − (S_k+1 − S_k) − w_k (theory note 4): exact, whatever happened in between.
+
+    With it T + S + Σw is constant, so Σw ≤ S₀ + T₀ as long as T ≥ 0: passivity at the joints, for any
+    controller inside, from measured τ_a, q and the storage alone.
+    """
+
+    falls_back: ClassVar[bool] = True
+
+    def settle(self, level: cs.SX, flows: PeriodFlows, g: SimpleNamespace) -> TankEntry:
+        """Return the entry of −ΔS − w."""
+        ok = finite(level, flows.storage_change, flows.port_energy)
+        flow = -flows.storage_change - flows.port_energy
+        return booked(level, granted=0, flow=flow, cap=g.tank_cap, ok=ok)
+
+    def pay(self, level: cs.SX, cost: cs.SX, g: SimpleNamespace) -> TankEntry:
+        """Return the entry of a cost: ΔU, or |ΔU| if the tank is not signed."""
+        return paid(level, cost, g)
+
+    def budget(self, level: cs.SX, elapsed: cs.SX, g: SimpleNamespace) -> cs.SX:
+        """Return min(T − T_min, P_max Δt)."""
+        return above_floor(level, elapsed, g)
+
+    def braking(self, level: cs.SX, speed_squared: cs.SX, elapsed: cs.SX, g: SimpleNamespace) -> cs.SX:
+        """Return 0: what this tank does about an active loop is the fallback."""
+        return cs.SX(0)
+
+    def stiffness_share(self, level: cs.SX, g: SimpleNamespace) -> cs.SX:
+        """Return 1."""
+        return cs.SX(1)
+
+
+@final
+class PaperTank(AbstractTank):
+    """(19)–(23) at the samples: T_k+1 = T_k + α P_D Δt − |ΔU|.
+
+    P_D is the law's formula, in which sampling, delay, saturation and noise do not occur: under them it
+    credits energy that nobody dissipated.
+    """
+
+    def settle(self, level: cs.SX, flows: PeriodFlows, g: SimpleNamespace) -> TankEntry:
+        """Return the entry of α P_D Δt."""
+        ok = finite(level, flows.claimed_loss)
+        return booked(level, granted=0, flow=g.tank_fill * flows.claimed_loss, cap=g.tank_cap, ok=ok)
+
+    def pay(self, level: cs.SX, cost: cs.SX, g: SimpleNamespace) -> TankEntry:
+        """Return the entry of a cost, |ΔU| as printed or ΔU if the tank is signed."""
+        return paid(level, cost, g)
+
+    def budget(self, level: cs.SX, elapsed: cs.SX, g: SimpleNamespace) -> cs.SX:
+        """Return min(T − T_min, P_max Δt)."""
+        return above_floor(level, elapsed, g)
+
+    def braking(self, level: cs.SX, speed_squared: cs.SX, elapsed: cs.SX, g: SimpleNamespace) -> cs.SX:
+        """Return 0."""
+        return cs.SX(0)
+
+    def stiffness_share(self, level: cs.SX, g: SimpleNamespace) -> cs.SX:
+        """Return 1."""
+        return cs.SX(1)
+
+
+@final
+class TimeDomainTank(AbstractTank):
+    """Passivity observer and controller in the time domain, after Hannaford and Ryu (2002).
+
+    The observer is E_k+1 = E_k − w_k, started at S₀ + T₀. The controller acts when E < 0: it adds, in the
+    same period, the damping −E / (Δt |φ̇|²) that would pay the debt within it, at most α_max. It gates no
+    reference: what that gives shows at the port a moment later.
+    """
+
+    def settle(self, level: cs.SX, flows: PeriodFlows, g: SimpleNamespace) -> TankEntry:
+        """Return the entry of −w."""
+        ok = finite(level, flows.port_energy)
+        return booked(level, granted=0, flow=-flows.port_energy, cap=g.tank_cap, ok=ok)
+
+    def pay(self, level: cs.SX, cost: cs.SX, g: SimpleNamespace) -> TankEntry:
+        """Return an entry of nothing: the observer sees the port only."""
+        return booked(level, granted=0, flow=0, cap=g.tank_cap, ok=finite(level, cost))
+
+    def budget(self, level: cs.SX, elapsed: cs.SX, g: SimpleNamespace) -> cs.SX:
+        """Return no limit."""
+        return cs.SX(UNLIMITED)
+
+    def braking(self, level: cs.SX, speed_squared: cs.SX, elapsed: cs.SX, g: SimpleNamespace) -> cs.SX:
+        """Return α = min(−E / (Δt |φ̇|²), α_max) while E < 0."""
+        debt = cs.fmax(-level, 0)
+        work = elapsed * speed_squared  # per unit of damping
+        payable = work * g.tank_braking > debt
+        return cs.if_else(payable, debt / cs.fmax(work, 1e-300), cs.if_else(debt > 0, g.tank_braking, 0))
+
+    def stiffness_share(self, level: cs.SX, g: SimpleNamespace) -> cs.SX:
+        """Return 1."""
+        return cs.SX(1)
+
+
+@final
+class VariableStiffnessTank(AbstractTank):
+    """The tank of Ferraguti, Secchi and Fantuzzi (2013), for a stiffness that changes in flight.
+
+    The spring's part above the base stiffness, K_x − K_base, takes its energy from the tank and gives it
+    back: T_k+1 = T_k + α ẋᵀD_xẋ Δt + work done on that part. As the tank runs empty, that part is switched
+    off. A change of the stiffness is free, and the reference is not gated.
+    """
+
+    def settle(self, level: cs.SX, flows: PeriodFlows, g: SimpleNamespace) -> TankEntry:
+        """Return the entry of α ẋᵀD_xẋ Δt and of the work on the variable part."""
+        ok = finite(level, flows.claimed_cartesian_loss, flows.variable_spring_work)
+        flow = g.tank_fill * flows.claimed_cartesian_loss + flows.variable_spring_work
+        return booked(level, granted=0, flow=flow, cap=g.tank_cap, ok=ok)
+
+    def pay(self, level: cs.SX, cost: cs.SX, g: SimpleNamespace) -> TankEntry:
+        """Return an entry of nothing."""
+        return booked(level, granted=0, flow=0, cap=g.tank_cap, ok=finite(level, cost))
+
+    def budget(self, level: cs.SX, elapsed: cs.SX, g: SimpleNamespace) -> cs.SX:
+        """Return no limit."""
+        return cs.SX(UNLIMITED)
+
+    def braking(self, level: cs.SX, speed_squared: cs.SX, elapsed: cs.SX, g: SimpleNamespace) -> cs.SX:
+        """Return 0."""
+        return cs.SX(0)
+
+    def stiffness_share(self, level: cs.SX, g: SimpleNamespace) -> cs.SX:
+        """Return β(T)."""
+        return self.valve(level, g)
