@@ -78,7 +78,7 @@ def test_a_complete_file():
     assert s.reference[1].plane == ("y", "z")
     assert s.reference[2].turn == pytest.approx((0, 0, math.pi / 6))
     assert (s.forces[0].start, s.forces[0].end) == (20.0, 21.0)
-    assert s.tank == TankSettings()
+    assert s.tank == TankSettings().completed("paper")
     assert s.tank.cap == math.inf
     assert s.noise == Noise(torque_variance=0.2, hold=0.001)
     assert (s.output_interval, s.tolerance, s.seed) == (0.005, 1e-10, 0)
@@ -133,7 +133,7 @@ def test_an_empty_entry_counts_as_left_out():
     s = parse_scenario(
         changed("forces:\n  - {from: 20 s, to: 21 s, force: [0, 4, 0]}", "forces:\ntank:\ntool:")
     )
-    assert (s.forces, s.tank, s.tool.position) == ((), TankSettings(), (0.0, 0.0, 0.0))
+    assert (s.forces, s.tank, s.tool.position) == ((), TankSettings().completed("paper"), (0.0, 0.0, 0.0))
 
 
 def test_anchors_are_allowed():

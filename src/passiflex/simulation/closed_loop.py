@@ -146,7 +146,7 @@ class ClosedLoop:
 
         tau_a = robot.joint_torque(state, plant)
         tau_e = arm.jacobian(x.q, plant).T @ u.F_e
-        measurement = Measurement(x.q, x.theta, x.dq, x.dtheta, tau_a + u.torque_noise, u.F_e)
+        measurement = Measurement(x.q, x.theta, x.dq, x.dtheta, tau_a + u.torque_noise, u.F_e, tau_e)
         command: Command = self.law.command(measurement, reference, model, gains)
         claim = command.energy
         flow = self.tank.flow(x.tank_energy, claim.dissipated_power, claim.reference_power, tank)
@@ -233,7 +233,8 @@ class ClosedLoop:
         motion, c = MOTION.symbols("motion")
         model, m = self.law.robot.layout.symbols("model")
         gains, g = self.law.layout.symbols("gains")
-        y = Measurement(q, theta, dq, dtheta, tau_a, F_e)
+        tau_e = self.law.robot.arm.jacobian(q, m).T @ F_e
+        y = Measurement(q, theta, dq, dtheta, tau_a, F_e, tau_e)
         command = self.law.command(y, reference_at(clock, cs.SX(1), c), m, g)
         arguments = [q, theta, dq, dtheta, tau_a, F_e, clock, motion, model, gains]
         return cs.Function("law", arguments, [cs.densify(command.tau_m)], {"cse": True})

@@ -9,13 +9,25 @@ import casadi as cs
 from passiflex.control.gravity import AbstractGravity
 from passiflex.control.law import AbstractLaw
 from passiflex.control.task import AbstractTask
-from passiflex.native import DRIVER, FixedStep, NativeFunction, compile_functions, load_external
+from passiflex.native import (
+    DRIVER,
+    HELD_LOOP_DRIVER,
+    FixedStep,
+    HeldLoop,
+    NativeFunction,
+    compile_functions,
+    load_external,
+)
+from passiflex.sampled.controller import SampledController
 from passiflex.simulation.closed_loop import ClosedLoop
+from passiflex.simulation.sampled_loop import SampledLoop
 
 CVODES_DERIVATIVES = {"fd_method": "forward", "is_diff_in": [True, False, False]}
 """CVODES needs ∂ẋ/∂x only, and one-sided differences are enough for its Newton iteration."""
 
 _built: dict[tuple[str, type[AbstractLaw], AbstractTask, AbstractGravity], CompiledLoop] = {}
+
+_built_sampled: dict[tuple[object, ...], CompiledSampledLoop] = {}
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +57,42 @@ def compiled_loop(law: AbstractLaw) -> CompiledLoop:
     if key not in _built:
         _built[key] = _compile(ClosedLoop(law))
     return _built[key]
+
+
+@dataclass(frozen=True, eq=False)
+class CompiledSampledLoop:
+    """A sampled loop and its compiled functions; all numbers are run-time inputs.
+
+    Attributes
+    ----------
+    loop: The symbolic loop.
+    held: The loop through time.
+    plant, control, outputs, reference: Its functions, for arrays.
+    """
+
+    loop: SampledLoop
+    held: HeldLoop
+    plant: NativeFunction
+    control: NativeFunction
+    outputs: NativeFunction
+    reference: NativeFunction
+
+
+def compiled_sampled_loop(controller: SampledController) -> CompiledSampledLoop:
+    """Return the compiled sampled loop of a controller; from the process, the cache on disk, or compiled now."""
+    law = controller.law
+    key = (
+        law.robot.arm.chain.to_urdf(), type(law), law.task, law.gravity,
+        type(controller.tank), controller.external,
+    )  # fmt: skip
+    if key not in _built_sampled:
+        loop = SampledLoop(controller)
+        functions = [loop.plant.rhs, loop.control, loop.outputs, loop.reference]
+        library = compile_functions(functions, driver=HELD_LOOP_DRIVER)
+        native = [NativeFunction(f, library) for f in functions]
+        held = HeldLoop(loop.plant.rhs, loop.control, library)
+        _built_sampled[key] = CompiledSampledLoop(loop, held, *native)
+    return _built_sampled[key]
 
 
 def _compile(loop: ClosedLoop) -> CompiledLoop:

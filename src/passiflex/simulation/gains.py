@@ -102,7 +102,7 @@ def _symmetric(matrix: Array) -> Array:
 def tank_start(scenario: Scenario) -> TankStart:
     """Return the tank at the start; an empty one for a law without a tank."""
     t = scenario.tank
-    return TankStart(t.initial, t.floor, t.cap, t.accounting == "signed") if t else TankStart(0, 0, 0, False)
+    return TankStart(t.initial, t.floor, t.cap, t.signed) if t else TankStart(0, 0, 0, False)
 
 
 def tank_gains(scenario: Scenario) -> Array:
@@ -115,7 +115,7 @@ def tank_gains(scenario: Scenario) -> Array:
             "low": t.low,
             "cap": min(t.cap, NO_CAP),
             "band": t.band,
-            "signed": t.accounting == "signed",
+            "signed": t.signed,
         }
         if t
         else {"fill": 0, "floor": 0, "low": 1, "cap": NO_CAP, "band": 1, "signed": 0}

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from passiflex.control.law import AbstractLaw
+from passiflex.sampled.controller import SampledController
 from passiflex.simulation.motion import Motion, Pose
 
 Array = NDArray[np.float64]
@@ -38,6 +39,55 @@ class TankStart(NamedTuple):
     signed: bool
 
 
+class GainChange(NamedTuple):
+    """From `start` to `end` [s], K_x and D_x go over to these values (k, k) with minimum jerk."""
+
+    start: float
+    end: float
+    stiffness: Array
+    damping: Array
+
+
+class Interval(NamedTuple):
+    """From `start` on, before `end` [s], these numbers hold in the rows of a sampled loop."""
+
+    start: float
+    end: float
+    numbers: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Sampling:
+    """How the law runs on a robot.
+
+    Attributes
+    ----------
+    controller: The law with tank, governor and estimators.
+    period, delay, jitter: [s].
+    missed: Share of periods in which the law does not run.
+    insist: Whether to run a loop that is unstable by the limit map.
+    numbers: Flat vector of `SampledLoop.parameters`.
+    plant: Flat vector of `Plant.parameters`, the first part of it.
+    held: Motor torque at the start (n,).
+    gains: Changes of K_x and D_x, in the order of time.
+    feedforward: Wrenches (6,) that the end effector is to exert.
+    drags: Viscous and dry drag (2,).
+    """
+
+    controller: SampledController
+    period: float
+    delay: float
+    jitter: float
+    missed: float
+    insist: bool
+    numbers: Array
+    plant: Array
+    held: Array
+    gains: tuple[GainChange, ...]
+    feedforward: tuple[Interval, ...]
+    drags: tuple[Interval, ...]
+
+
 @dataclass(frozen=True, eq=False)
 class Problem:
     """A closed loop with all its numbers.
@@ -51,6 +101,7 @@ class Problem:
     events: By time; the first at time 0.
     duration, output_interval: [s].
     configuration: The resolved scenario as text; it is stored beside the result.
+    sampling: How the law runs if it runs once per period; None in continuous time.
     """
 
     name: str
@@ -70,6 +121,7 @@ class Problem:
     tolerance: float
     seed: int
     configuration: str
+    sampling: Sampling | None = None
 
     @property
     def parameters(self) -> Array:

@@ -16,6 +16,7 @@ from passiflex.simulation.gains import law_gains, tank_gains, tank_start
 from passiflex.simulation.law_settings import RigidSettings
 from passiflex.simulation.posture import SINGULAR, posture
 from passiflex.simulation.problem import Noise, Problem
+from passiflex.simulation.sampling import sampling
 from passiflex.simulation.scenario import Scenario
 from passiflex.simulation.scenario_file import parse_scenario
 from passiflex.simulation.timeline import timeline
@@ -84,6 +85,7 @@ def resolve(scenario: Scenario, robot: FlexibleJointRobot | None = None) -> Prob
         tolerance=scenario.tolerance,
         seed=scenario.seed,
         configuration=scenario.to_yaml(),
+        sampling=sampling(scenario, law, plant, model, gains, q, at_start) if scenario.control else None,
     )
 
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import json
 import subprocess
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -16,10 +17,9 @@ from numpy.typing import NDArray
 
 from passiflex.errors import RunFileError
 from passiflex.files import whole_file
-from passiflex.layout import Field
+from passiflex.layout import Field, Layout
 
 if TYPE_CHECKING:
-    from passiflex.simulation.closed_loop import ClosedLoop
     from passiflex.simulation.problem import Problem
 
 FORMAT = "passiflex run 1"
@@ -29,16 +29,17 @@ AXES = {
     "rotation": ("axis", "column"),
     "desired_rotation": ("axis", "column"),
     "wrench": ("component",),
+    "governed_position": ("axis",),
+    "governed_rotation": ("axis", "column"),
+    "held_stiffness": ("row", "component"),
 }
-AUDITED = (
+PHYSICAL = (
     "tank_energy",
     "external_energy",
     "motor_energy",
     "joint_energy",
     "joint_loss_energy",
     "reference_energy",
-    "drawn_energy",
-    "spilled_energy",
     "link_kinetic_energy",
     "motor_kinetic_energy",
     "joint_spring_energy",
@@ -48,13 +49,23 @@ AUDITED = (
     "shaped_spring_energy",
     "cartesian_spring_energy",
     "gravity_storage",
-    *(
-        f"{flow}_power"
-        for flow in ("external", "motor", "joint", "joint_loss", "reference", "drawn", "spilled")
-    ),
+    *(f"{flow}_power" for flow in ("external", "motor", "joint", "joint_loss")),
 )
-"""What the energy balances of a run are made of."""
-ATTRIBUTES = ("name", "failure", "events", "has_tank", "configuration")
+"""What the energy balances of any run are made of."""
+SAMPLED = (
+    *PHYSICAL,
+    "friction_energy",
+    "friction_power",
+    "law_storage",
+    *(f"{flow}_energy" for flow in ("measured_port", "granted", "drawn", "refilled", "spilled")),
+)
+CONTINUOUS = (
+    *PHYSICAL,
+    "drawn_energy",
+    "spilled_energy",
+    *(f"{flow}_power" for flow in ("reference", "drawn", "spilled")),
+)
+ATTRIBUTES = ("name", "failure", "events", "has_tank", "configuration", "control_period")
 COORDINATES = {
     "axis": ["x", "y", "z"],
     "column": ["x", "y", "z"],
@@ -78,6 +89,11 @@ class Run:
     def name(self) -> str:
         """Return the name of the scenario."""
         return str(self.data.attrs["name"])
+
+    @property
+    def sampled(self) -> bool:
+        """Return whether the law ran once per control period."""
+        return bool(self.data.attrs["control_period"])
 
     @property
     def failure(self) -> str:
@@ -130,48 +146,51 @@ class Run:
                 got=data.attrs.get("format", "no format"),
                 needs=repr(FORMAT),
             )
-        missing = [name for name in (*AUDITED, "time") if name not in data]
+        needed = (*(SAMPLED if data.attrs.get("control_period") else CONTINUOUS), "time")
+        missing = [name for name in needed if name not in data]
         missing += [name for name in ATTRIBUTES if name not in data.attrs]
         if missing or not data.sizes.get("time"):
             got = f"no {', '.join(missing)}" if missing else "no rows"
             raise RunFileError(f"{path} is not a complete run", got=got)
-        broken = [name for name in (*AUDITED, "time") if not np.isfinite(data[name].to_numpy()).all()]
+        broken = [name for name in needed if not np.isfinite(data[name].to_numpy()).all()]
         if broken:
             raise RunFileError(f"{path} has numbers that are not finite", got=f"in {', '.join(broken)}")
         return cls(data)
 
 
+class Rows(NamedTuple):
+    """Recorded rows: what each column is, the numbers (N, size), and a suffix for the names."""
+
+    layout: Layout
+    numbers: NDArray[np.float64]
+    suffix: str = ""
+
+
 def assemble(
     problem: Problem,
-    loop: ClosedLoop,
     time: NDArray[np.float64],
-    states: NDArray[np.float64],
-    energies: NDArray[np.float64],
-    outputs: NDArray[np.float64],
+    recorded: Sequence[Rows],
     events: list[dict[str, Any]],
     failure: str,
 ) -> Run:
     """Return the run of recorded rows."""
-    from passiflex.simulation.closed_loop import ENERGIES
-
     variables: dict[str, Any] = {}
-
-    def add(fields: Any, rows: dict[str, NDArray[np.float64]], suffix: str = "") -> None:
-        for f in fields:
-            variables[f.name + suffix] = (_dims(f), rows[f.name], {"units": f.unit, "long_name": f.meaning})
-
-    add(loop.state, loop.state.unpack(states))
-    add(ENERGIES, ENERGIES.unpack(energies), "_energy")
-    add(loop.output_layout, loop.output_layout.unpack(outputs))
-    n = problem.law.robot.n
-    robot, (angle, speed, torque) = problem.law.robot, loop.joint_units
+    for layout, numbers, suffix in recorded:
+        values = layout.unpack(numbers)
+        for f in layout:
+            variables[f.name + suffix] = (
+                _dims(f), values[f.name], {"units": f.unit, "long_name": f.meaning},
+            )  # fmt: skip
+    n, robot = problem.law.robot.n, problem.law.robot
+    chain = robot.arm.chain
+    angle, speed, torque = chain.unit("rad", "m"), chain.unit("rad/s", "m/s"), chain.unit("N m", "N")
     for name, limit, unit in (
         ("torque_limit", robot.torque_limit, torque),
         ("velocity_limit", robot.velocity_limit, speed),
         ("lower_position_limit", robot.position_limit[:, 0], angle),
         ("upper_position_limit", robot.position_limit[:, 1], angle),
     ):
-        variables[name] = (("joint",), limit, {"units": unit, "long_name": "of the robot; not applied"})
+        variables[name] = (("joint",), limit, {"units": unit, "long_name": "of the robot"})
     used = {d for dims, *_ in variables.values() for d in dims}
     coordinates: dict[str, Any] = {k: v for k, v in COORDINATES.items() if k in used}
     coordinates["joint"] = np.arange(1, n + 1)
@@ -185,6 +204,7 @@ def assemble(
         "sources": json.dumps(robot.sources, ensure_ascii=False),
         "seed": problem.seed,
         "has_tank": int(problem.law.has_tank),
+        "control_period": problem.sampling.period if problem.sampling else 0.0,
         "version": package_version(),
         "commit": source_commit(),
         "events": json.dumps(events),

@@ -7,14 +7,23 @@ from typing import Annotated, Any, Literal, Self
 import yaml
 from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
 
+from passiflex.simulation.control_settings import (
+    Actions,
+    Control,
+    Drag,
+    Feedforward,
+    GainChange,
+    MotorSettings,
+    SensorSettings,
+)
 from passiflex.simulation.law_settings import ImpedanceSettings, RigidSettings
 from passiflex.simulation.quantity import Quantity, shown
 from passiflex.simulation.section import Mistakes, Section
+from passiflex.simulation.tank_settings import TankSettings
 
 Vector = tuple[float, ...]
 Seconds = Annotated[float, Quantity("s", above=0)]
 Instant = Annotated[float, Quantity("s", least=0)]
-Energy = Annotated[float, Quantity("J", least=0)]
 Length = Annotated[Vector, Quantity("m", ((3,),))]
 Turn = Annotated[Vector, Quantity("rad", ((3,),))]
 RelativeError = Annotated[float, Quantity("1", above=-1)]
@@ -28,42 +37,6 @@ class Tool(Section):
         default=ZERO, description="offset of the end effector, in the axes of the robot's own, m"
     )
     rotation_vector: Turn = Field(default=ZERO, description="turn of the end effector's axes, rad")
-
-
-class TankSettings(Section):
-    """The energy tank that pays for the motion of the reference."""
-
-    initial: Energy = Field(default=2.0, description="energy at the start, J")
-    fill: Annotated[float, Quantity("1", least=0, most=1)] = Field(
-        default=1.0, description="share α of the dissipated power that fills the tank, 0 to 1"
-    )
-    floor: Energy = Field(default=0.01, description="level that the reference never draws below, J")
-    low: Energy = Field(default=0.05, description="level below which the reference slows down, J")
-    cap: Annotated[float, Quantity("J", least=0, finite=False)] = Field(
-        default=float("inf"), description="level above which energy is spilled, J; inf for none"
-    )
-    band: Annotated[float, Quantity("J", above=0)] = Field(
-        default=0.05, description="width below the cap over which the inflow fades out, J"
-    )
-    accounting: Literal["paper", "signed"] = Field(
-        default="paper", description="a moving reference draws |P_X| (paper) or P_X (signed)"
-    )
-
-    @model_validator(mode="after")
-    def _ordered(self) -> Self:
-        found: list[tuple[tuple[str | int, ...], str]] = []
-        if not self.initial > self.floor:
-            what = f"a tank started empty never moves the reference; got {self.initial:g} J"
-            found.append((("initial",), f"{what}; needs more than the floor of {self.floor:g} J"))
-        if not self.low > self.floor:
-            found.append((("low",), f"needs more than the floor of {self.floor:g} J; got {self.low:g} J"))
-        if not self.cap - self.band > self.low:
-            found.append(
-                (("cap",), f"needs more than low + band, {self.low + self.band:g} J; got {self.cap:g} J")
-            )
-        if found:
-            raise Mistakes(*found)
-        return self
 
 
 class Step(Section):
@@ -154,7 +127,13 @@ class Noise(Section):
 
 
 def _own_tank(data: dict[str, Any]) -> TankSettings | None:
-    return TankSettings() if isinstance(data.get("law"), ImpedanceSettings) else None
+    if not isinstance(data.get("law"), ImpedanceSettings):
+        return None
+    return TankSettings().completed("port" if data.get("control") else "paper")
+
+
+WITH_CONTROL = ("sensors", "motors", "actions", "gains", "feedforward", "drags")
+"""Entries of a scenario that only a sampled run has."""
 
 
 class Scenario(Section):
@@ -174,6 +153,9 @@ class Scenario(Section):
     law: Annotated[ImpedanceSettings | RigidSettings, Field(discriminator="type")] = Field(
         description="control law"
     )
+    control: Control | None = Field(
+        default=None, description="a controller that samples; continuous time if left out"
+    )
     tank: TankSettings | None = Field(
         default_factory=_own_tank, description="energy tank; with the impedance law only"
     )
@@ -187,10 +169,21 @@ class Scenario(Section):
         default=None,
         description="noise on the measured joint torque, which the rigid law does not use; none if left out",
     )
+    sensors: SensorSettings | None = Field(default=None, description="sensors, with control only")
+    motors: MotorSettings | None = Field(default=None, description="motors, with control only")
+    actions: Actions | None = Field(default=None, description="gated actions, with control only")
+    gains: tuple[GainChange, ...] = Field(
+        default=(), description="changes of K_x and D_x in the order of time, with control only"
+    )
+    feedforward: tuple[Feedforward, ...] = Field(
+        default=(), description="wrenches that the end effector is to exert, with control only"
+    )
+    drags: tuple[Drag, ...] = Field(default=(), description="drags at the end effector, with control only")
     output_interval: Seconds = Field(
         default=0.005,
         validate_default=True,
-        description="time between two rows of the result, s; with noise a whole multiple of noise.hold",
+        description="time between two rows of the result, s; with noise a whole multiple of noise.hold, "
+        "with control of the period",
     )
     tolerance: Annotated[float, Quantity("1", least=1e-13, most=1e-3)] = Field(
         default=1e-9, description="relative tolerance of the integrator"
@@ -200,9 +193,52 @@ class Scenario(Section):
     @field_validator("tank")
     @classmethod
     def _tank_of_the_law(cls, tank: TankSettings | None, info: ValidationInfo) -> TankSettings | None:
-        if isinstance(info.data.get("law"), RigidSettings) and tank is not None:
+        if tank is None:
+            return None
+        if isinstance(info.data.get("law"), RigidSettings):
             raise ValueError("only the impedance law has a tank; remove it, or take law type: impedance")
-        return tank
+        sampled = info.data.get("control") is not None
+        if not sampled and tank.kind not in (None, "paper"):
+            raise Mistakes(
+                (("kind",), f"a tank of kind {tank.kind} needs `control`, a rate at which it runs")
+            )
+        return tank.completed("port" if sampled else "paper")
+
+    @field_validator(*WITH_CONTROL)
+    @classmethod
+    def _only_sampled(cls, entry: Any, info: ValidationInfo) -> Any:
+        if entry and "control" in info.data and info.data["control"] is None:
+            raise ValueError("needs `control`: only a sampled run has it")
+        return entry
+
+    @field_validator("gains")
+    @classmethod
+    def _gains_of_the_task(
+        cls, changes: tuple[GainChange, ...], info: ValidationInfo
+    ) -> tuple[GainChange, ...]:
+        found: list[tuple[tuple[str | int, ...], str]] = []
+        for i, change in enumerate(changes):
+            if i and not change.at >= changes[i - 1].at + changes[i - 1].duration:
+                found.append(((i, "at"), f"the change before lasts longer; got {change.at:g} s"))
+            if change.damping is not None and change.damping.ratio is not None:
+                found.append(((i, "damping"), "a damping ratio belongs to one posture; give D_x itself"))
+            for part in (change.stiffness, change.damping):
+                if part is not None and "law" in info.data:
+                    part.require(info.data["law"].task)
+        if found:
+            raise Mistakes(*found)
+        return changes
+
+    @field_validator("noise")
+    @classmethod
+    def _once_per_period(cls, noise: Noise | None, info: ValidationInfo) -> Noise | None:
+        control = info.data.get("control")
+        if noise is None or control is None:
+            return noise
+        if abs(noise.hold * control.rate - 1) > 1e-9:
+            needs = f"the control period, {1 / control.rate:g} s: sensors are read once in it"
+            raise Mistakes((("hold",), f"needs to be {needs}; got {noise.hold:g} s"))
+        return noise
 
     @field_validator("reference")
     @classmethod
@@ -242,12 +278,14 @@ class Scenario(Section):
         if interval > info.data.get("duration", float("inf")):
             needs = f"needs to be no longer than the duration, {info.data['duration']:g} s"
             raise ValueError(f"{needs}; got {interval:g} s")
-        noise = info.data.get("noise")
-        if noise is None:
-            return interval
-        samples = interval / noise.hold
-        if not 0.5 < samples < 1e9 or abs(samples - round(samples)) > 1e-9 * samples:
-            raise ValueError(f"needs a whole multiple of noise.hold, {noise.hold:g} s; got {interval:g} s")
+        noise, control = info.data.get("noise"), info.data.get("control")
+        for step, name in (
+            (noise and noise.hold, "noise.hold"),
+            (control and 1 / control.rate, "the period"),
+        ):
+            samples = interval / step if step else 1.0
+            if not 0.5 < samples < 1e9 or abs(samples - round(samples)) > 1e-9 * samples:
+                raise ValueError(f"needs a whole multiple of {name}, {step:g} s; got {interval:g} s")
         return interval
 
     def to_yaml(self) -> str:

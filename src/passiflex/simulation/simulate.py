@@ -24,12 +24,15 @@ from passiflex.simulation.integrate import (
 )
 from passiflex.simulation.motion import MOTION, Motion, Pose, between, pose_at, shifted
 from passiflex.simulation.problem import Event, Problem
-from passiflex.simulation.run import Run, assemble
+from passiflex.simulation.run import Rows, Run, assemble
+from passiflex.simulation.simulate_sampled import simulate_sampled
 
 Array = NDArray[np.float64]
 
 NOW = 1e-9
 """Two instants closer than this are one [s]."""
+NOTHING = 1e-12
+"""Energy [J] below which a jump of the reference is round-off."""
 MOST_ROWS = 2_000_000
 
 
@@ -44,7 +47,7 @@ def simulate(problem: Problem) -> Run:
     SimulationError
         If the start is not finite, or the events do not fit the noise's hold time.
     """
-    return _Simulation(problem).run()
+    return simulate_sampled(problem) if problem.sampling else _Simulation(problem).run()
 
 
 class _Record:
@@ -131,9 +134,13 @@ class _Simulation:
         outputs: Array = np.asarray(
             self.compiled.outputs.map(states, record.inputs[:good], self.p), dtype=float
         )
-        return assemble(
-            problem, self.compiled.loop, record.time[:good], states, energies, outputs, self.log, failure
-        )
+        loop = self.compiled.loop
+        recorded = [
+            Rows(loop.state, states),
+            Rows(ENERGIES, energies, "_energy"),
+            Rows(loop.output_layout, outputs),
+        ]
+        return assemble(problem, record.time[:good], recorded, self.log, failure)
 
     def _draw_noise(self, n: int) -> Array | None:
         noise = self.problem.noise
@@ -227,7 +234,7 @@ class _Simulation:
             self.energies[ENERGIES.slices["drawn"]] += cost
             self.energies[ENERGIES.slices["spilled"]] += after - float(self.x[level][0])
         self.energies[ENERGIES.slices["reference"]] += stored
-        if stored or share < 1:
+        if abs(stored) > NOTHING or share < 1:
             self.log.append({"time": time, "event": "reference jump", "stored_J": stored, "share": share})
         return motion
 

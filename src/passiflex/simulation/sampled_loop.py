@@ -1,0 +1,241 @@
+"""One control period as a compiled function: sensors, controller, motor limits; and what is recorded of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from types import SimpleNamespace
+from typing import NamedTuple
+
+import casadi as cs
+
+from passiflex.control.signals import Measurement
+from passiflex.layout import Field, Layout
+from passiflex.robots.arm import EndEffectorPose
+from passiflex.sampled.controller import SampledController
+from passiflex.sampled.motors import limit_layout, limited
+from passiflex.sampled.sensors import Sensors
+from passiflex.sampled.signals import ControlParameters, Wish
+from passiflex.simulation.motion import MOTION, reference_at
+from passiflex.simulation.plant import PLANT_ENERGIES, SURROUNDINGS, Plant
+
+
+class Parts(NamedTuple):
+    """The parameters of the period, in the order of the flat vector."""
+
+    plant: Layout
+    model: Layout
+    gains: Layout
+    fallback: Layout
+    tank: Layout
+    actions: Layout
+    observer: Layout
+    sensors: Layout
+    limits: Layout
+
+
+@dataclass(frozen=True, eq=False)
+class SampledLoop:
+    """Plant and controller as functions of flat vectors, ready for code generation.
+
+    `plant.rhs` is the plant; `control` is (x, c, row, p) → (c, command, signals), one period; `outputs` is
+    (x, command, surroundings, p) → what is true then; `reference` is (clock, motion) → pose and derivatives.
+    """
+
+    controller: SampledController
+
+    @cached_property
+    def plant(self) -> Plant:
+        """Return the plant."""
+        return Plant(self.controller.law.robot)
+
+    @cached_property
+    def sensors(self) -> Sensors:
+        """Return the sensors."""
+        return Sensors(self.controller.law.robot.n)
+
+    @cached_property
+    def parameters(self) -> Parts:
+        """Return the layouts of everything that `control` is told."""
+        n = self.controller.law.robot.n
+        model, gains, fallback, tank, actions, observer = self.controller.parameters
+        plant, sensors, limits = self.plant.parameters, self.sensors.layout, limit_layout(n)
+        return Parts(plant, model, gains, fallback, tank, actions, observer, sensors, limits)
+
+    @cached_property
+    def memory(self) -> Layout:
+        """Return the state of `control`: the sensors', the controller's, and the torque of the motors."""
+        n = self.controller.law.robot.n
+        torque = Layout((Field("given_torque", (n,), "N m", "that the motors were last told to give"),))
+        return self.sensors.state + self.controller.state + torque
+
+    @cached_property
+    def row(self) -> Layout:
+        """Return what is told anew in every period; the surroundings come first."""
+        n, k = self.controller.law.robot.n, self.controller.law.task.size
+        return SURROUNDINGS + Layout(
+            (
+                Field("desired_position", (3,), "m", "x_d"),
+                Field("desired_rotation", (3, 3), "1", "axes of x_d"),
+                Field("desired_velocity", (6,), "m/s, rad/s", "ẋ_d"),
+                Field("desired_acceleration", (6,), "m/s^2, rad/s^2", "ẍ_d"),
+                Field("desired_stiffness", (k, k), "N/m, N, N m/rad", "K_x"),
+                Field("desired_damping", (k, k), "N s/m, N s, N m s/rad", "D_x"),
+                Field("feedforward", (6,), "N, N m", "wrench that the end effector is to exert"),
+                Field("torque_noise", (n,), "N m", "of the joint torque sensors"),
+                Field("elapsed", (), "s", "since the last period that ran"),
+            )
+        )
+
+    @cached_property
+    def signals(self) -> Layout:
+        """Return what `control` says of one period."""
+        n = self.controller.law.robot.n
+        claimed = "claimed by the law"
+        return Layout(
+            (
+                Field("measured_q", (n,), "rad", "q as the sensors have it"),
+                Field("measured_theta", (n,), "rad", "θ as the sensors have it"),
+                Field("measured_dq", (n,), "rad/s", "q̇ as the sensors have it"),
+                Field("measured_dtheta", (n,), "rad/s", "θ̇ as the sensors have it"),
+                Field("measured_tau_a", (n,), "N m", "τ_a as the sensors have it"),
+                Field("believed_tau_e", (n,), "N m", "τ_e as the law believes it"),
+                Field("commanded_torque", (n,), "N m", "τ_m before the motors' limits"),
+                Field("tau_u", (n,), "N m", "outer-loop torque"),
+                Field("phi", (n,), "rad", "shaped motor coordinate of (11)"),
+                Field("dphi", (n,), "rad/s", "its velocity"),
+                Field("compensated_energy", (), "J", f"V̂(q) of the law's model, {claimed}"),
+                Field("shaped_kinetic_energy", (), "J", f"½ φ̇ᵀ B_e φ̇, {claimed}"),
+                Field("shaped_spring_energy", (), "J", f"½ (φ−q)ᵀ K_e (φ−q), {claimed}"),
+                Field("cartesian_spring_energy", (), "J", f"U(φ; x̂_d), {claimed}"),
+                Field("gravity_storage", (), "J", f"of the gravity compensation, {claimed}"),
+                Field("reference_share", (), "1", "γ of the reference"),
+                Field("stiffness_share", (), "1", "γ of the stiffness"),
+                Field("valve", (), "1", "β"),
+            )
+        )
+
+    @cached_property
+    def truth(self) -> Layout:
+        """Return what `outputs` says of one instant."""
+        n = self.controller.law.robot.n
+        return Layout(
+            (
+                Field("position", (3,), "m", "end effector"),
+                Field("rotation", (3, 3), "1", "axes of the end effector"),
+                Field("tau_a", (n,), "N m", "torque through the joint, positive on the link"),
+                Field("tau_e", (n,), "N m", "external joint torque"),
+                Field("wrench", (6,), "N, N m", "F_e on the end effector, drag included"),
+                Field("link_kinetic_energy", (), "J", "½ q̇ᵀ M q̇"),
+                Field("motor_kinetic_energy", (), "J", "½ θ̇ᵀ B θ̇"),
+                Field("joint_spring_energy", (), "J", "½ (θ−q)ᵀ K (θ−q)"),
+                Field("potential_energy", (), "J", "V(q)"),
+            )
+        ) + Layout(
+            tuple(Field(f"{f.name}_power", (), "W", f"rate of {f.name}_energy") for f in PLANT_ENERGIES)
+        )
+
+    @cached_property
+    def control(self) -> cs.Function:
+        """Return (x, c, row, p) → (c, command, signals)."""
+        robot = self.controller.law.robot
+        state = cs.SX.sym("x", 4 * robot.n)
+        memory, c = self.memory.symbols("c")
+        row, w = self.row.symbols("row")
+        p = cs.SX.sym("p", sum(part.size for part in self.parameters))
+        views = _views(self.parameters, p)
+        x = self.plant.view(state)
+        torques = self.plant.torques(x, w, views.plant)
+        true = Measurement(x.q, x.theta, x.dq, x.dtheta, torques.tau_a, torques.wrench, torques.tau_e)
+        y, read = self.sensors.read(true, w.torque_noise, w.elapsed, c, views.sensors)
+        wish = Wish(
+            EndEffectorPose(w.desired_position, w.desired_rotation),
+            w.desired_velocity,
+            w.desired_acceleration,
+            w.desired_stiffness,
+            w.desired_damping,
+            w.feedforward,
+        )
+        told = ControlParameters(*(getattr(views, part) for part in Parts._fields[1:-2]))
+        start = self.sensors.state.size
+        own = memory[start : start + self.controller.state.size]
+        command, after, entry, believed = self.controller.step(y, wish, w.elapsed, own, told)
+        limits = views.limits
+        given = limited(
+            command.tau_m, c.given_torque, limits.torque_limit, limits.torque_rate_limit, w.elapsed
+        )
+        claim = command.energy
+        signals = self.signals.stack(
+            {
+                "measured_q": y.q,
+                "measured_theta": y.theta,
+                "measured_dq": y.dq,
+                "measured_dtheta": y.dtheta,
+                "measured_tau_a": y.tau_a,
+                "believed_tau_e": believed.tau_e,
+                "commanded_torque": command.tau_m,
+                "tau_u": command.tau_u,
+                "phi": command.phi,
+                "dphi": command.dphi,
+                "compensated_energy": robot.arm.potential_energy(y.q, views.model),
+                "shaped_kinetic_energy": claim.motor_kinetic,
+                "shaped_spring_energy": claim.joint_spring,
+                "cartesian_spring_energy": claim.cartesian_spring,
+                "gravity_storage": claim.gravity_storage,
+                "reference_share": entry.reference_share,
+                "stiffness_share": entry.stiffness_share,
+                "valve": entry.valve,
+            }
+        )
+        next_memory = cs.vertcat(read, after, given)
+        return cs.Function(
+            "control",
+            [state, memory, row, p],
+            [cs.densify(next_memory), cs.densify(given), cs.densify(signals)],
+            {"cse": True},
+        )
+
+    @cached_property
+    def outputs(self) -> cs.Function:
+        """Return (x, command, surroundings, p) → `truth`, with p as for `control`."""
+        robot, arm = self.controller.law.robot, self.controller.law.robot.arm
+        state, command = cs.SX.sym("x", 4 * robot.n), cs.SX.sym("command", robot.n)
+        surroundings, s = SURROUNDINGS.symbols("s")
+        p = cs.SX.sym("p", sum(part.size for part in self.parameters))
+        m, x = _views(self.parameters, p).plant, self.plant.view(state)
+        torques = self.plant.torques(x, s, m)
+        _, powers = self.plant.rhs(state, cs.vertcat(command, surroundings), p[: self.parameters.plant.size])
+        pose, stretch = arm.pose(x.q, m), x.theta - x.q
+        values = {
+            "position": pose.position,
+            "rotation": pose.rotation,
+            "tau_a": torques.tau_a,
+            "tau_e": torques.tau_e,
+            "wrench": torques.wrench,
+            "link_kinetic_energy": cs.dot(x.dq, arm.mass_matrix(x.q, m) @ x.dq) / 2,
+            "motor_kinetic_energy": cs.dot(x.dtheta, m.motor_inertia * x.dtheta) / 2,
+            "joint_spring_energy": cs.dot(stretch, m.joint_stiffness * stretch) / 2,
+            "potential_energy": arm.potential_energy(x.q, m),
+        }
+        known = Layout(self.truth.fields[: len(values)]).stack(values)
+        return cs.Function(
+            "truth", [state, command, surroundings, p], [cs.densify(cs.vertcat(known, powers))], {"cse": True}
+        )
+
+    @cached_property
+    def reference(self) -> cs.Function:
+        """Return (clock, motion) → (position, rotation by rows, ẋ_d, ẍ_d) as one column."""
+        clock = cs.SX.sym("clock")
+        motion, c = MOTION.symbols("motion")
+        r = reference_at(clock, cs.SX(1), c)
+        acceleration = cs.jacobian(r.velocity, clock)
+        rows = cs.vertcat(r.pose.position, cs.vec(r.pose.rotation.T), r.velocity, acceleration)
+        return cs.Function("reference", [clock, motion], [cs.densify(rows)], {"cse": True})
+
+
+def _views(parts: Parts, p: cs.SX) -> SimpleNamespace:
+    views, start = {}, 0
+    for name, part in zip(Parts._fields, parts, strict=True):
+        views[name] = part.view(p[start : start + part.size])
+        start += part.size
+    return SimpleNamespace(**views)

@@ -1,0 +1,76 @@
+"""The settings of the energy tank in a scenario file, in SI units."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from passiflex.simulation.quantity import Quantity
+from passiflex.simulation.section import Mistakes, Section
+
+Energy = Annotated[float, Quantity("J", least=0)]
+
+
+class TankSettings(Section):
+    """The energy tank that pays for the motion of the reference."""
+
+    initial: Energy = Field(default=2.0, description="energy at the start, J")
+    fill: Annotated[float, Quantity("1", least=0, most=1)] = Field(
+        default=1.0, description="share α of the dissipated power that fills the tank, 0 to 1"
+    )
+    floor: Energy = Field(default=0.01, description="level that the reference never draws below, J")
+    low: Energy = Field(default=0.05, description="level below which the reference slows down, J")
+    cap: Annotated[float, Quantity("J", least=0, finite=False)] = Field(
+        default=float("inf"), description="level above which energy is spilled, J; inf for none"
+    )
+    band: Annotated[float, Quantity("J", above=0)] = Field(
+        default=0.05, description="width below the cap over which the inflow fades out, J"
+    )
+    accounting: Literal["paper", "signed"] | None = Field(
+        default=None,
+        description="a moving reference draws |P_X| (paper; default) or P_X (signed; default of the port tank)",
+    )
+    kind: Literal["paper", "port", "time_domain", "variable_stiffness"] | None = Field(
+        default=None,
+        description="whose books: paper (default without control), port (default with control), or those "
+        "after Hannaford and Ryu and after Ferraguti",
+    )
+    power: Annotated[float, Quantity("W", above=0, finite=False)] = Field(
+        default=float("inf"), description="largest power that the reference is granted, W; with control only"
+    )
+    trip: Energy | None = Field(
+        default=None, description="below it the law falls back, J; half of the floor if left out"
+    )
+    braking: Annotated[float, Quantity("N m s/rad", least=0)] = Field(
+        default=50.0, description="most damping that kind time_domain adds to the motors, N m s/rad"
+    )
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        found: list[tuple[tuple[str | int, ...], str]] = []
+        if not self.initial > self.floor:
+            what = f"a tank started empty never moves the reference; got {self.initial:g} J"
+            found.append((("initial",), f"{what}; needs more than the floor of {self.floor:g} J"))
+        if not self.low > self.floor:
+            found.append((("low",), f"needs more than the floor of {self.floor:g} J; got {self.low:g} J"))
+        if not self.cap - self.band > self.low:
+            found.append(
+                (("cap",), f"needs more than low + band, {self.low + self.band:g} J; got {self.cap:g} J")
+            )
+        if self.trip is not None and not self.trip < self.floor:
+            found.append((("trip",), f"needs less than the floor of {self.floor:g} J; got {self.trip:g} J"))
+        if found:
+            raise Mistakes(*found)
+        return self
+
+    def completed(self, kind: Literal["paper", "port"]) -> Self:
+        """Return the settings with `kind` and the accounting that goes with it, where they were left out."""
+        kind_ = self.kind or kind
+        accounting = self.accounting or ("signed" if kind_ == "port" else "paper")
+        return self.model_copy(update={"kind": kind_, "accounting": accounting})
+
+    @property
+    def signed(self) -> bool:
+        """Return whether what the reference takes out comes back to the tank."""
+        return self.accounting == "signed"
