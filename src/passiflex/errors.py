@@ -84,3 +84,7 @@ class PassiflexWarning(UserWarning):
 def nearest(name: str, known: Iterable[str]) -> list[str]:
     """Return up to three known names that are close to `name`, best first."""
     return difflib.get_close_matches(name, list(known), n=3, cutoff=0.5)
+
+
+class UnstableLoopError(PassiflexError):
+    """A law at a control rate and delay at which its sampled loop is unstable."""

@@ -11,6 +11,7 @@ from passiflex.errors import SimulationError
 from passiflex.layout import Field, Layout
 from passiflex.native import LoopState, NativeFunction, fastest_pole
 from passiflex.native.fixed_step import STABILITY_LIMIT
+from passiflex.simulation.admissible import require_stable
 from passiflex.simulation.compiled import CompiledSampledLoop, compiled_sampled_loop
 from passiflex.simulation.plant import PLANT_ENERGIES
 from passiflex.simulation.problem import Problem, Sampling
@@ -49,8 +50,14 @@ def simulate_sampled(problem: Problem) -> Run:
     """Return the run of a sampled problem.
 
     A run that leaves the finite numbers ends there, and says so in `Run.failure`.
+
+    Raises
+    ------
+    UnstableLoopError
+        If the loop is unstable at its rate and delay, and the scenario does not insist.
     """
     assert problem.sampling is not None
+    require_stable(problem)
     compiled = compiled_sampled_loop(problem.sampling.controller)
     return _record(problem, compiled)
 
