@@ -6,18 +6,33 @@ import abc
 from dataclasses import dataclass
 from functools import cached_property
 from types import SimpleNamespace
-from typing import final
+from typing import NamedTuple, final
 
 import casadi as cs
 
 from passiflex.control.gravity import AbstractGravity, RobotGravity
 from passiflex.control.inner_loop import motor_torque, shaped_damping, shaped_motion
-from passiflex.control.null_space import null_space_contribution
+from passiflex.control.null_space import null_space_contribution, null_space_damping
 from passiflex.control.signals import Command, LawEnergy, Measurement, Reference, Stored
 from passiflex.control.task import AbstractTask, PoseTask
 from passiflex.layout import Field, Layout
 from passiflex.robots.flexible import FlexibleJointRobot
 from passiflex.robots.linear_algebra import solve_spd
+
+
+class OuterLoop(NamedTuple):
+    """The outer loop at φ, with its damping still to be multiplied by φ̇.
+
+    Attributes
+    ----------
+    torque: −J(φ)ᵀ ∂U/∂x + τ_g, (n,) N m.
+    damping: J(φ)ᵀ D_x J(φ) + D_ns, (n, n) N m s/rad.
+    cartesian_damping: Its first part.
+    """
+
+    torque: cs.SX
+    damping: cs.SX
+    cartesian_damping: cs.SX
 
 
 class AbstractLaw(abc.ABC):
@@ -92,7 +107,20 @@ class ImpedanceLaw(AbstractLaw):
         phi, dphi = shaped_motion(y.q, y.theta, y.dq, y.dtheta, m.joint_stiffness, K_e)
         motors, springs = _shaped_energies(phi, dphi, y.q, g)
         weight = self.gravity.compensation(arm, phi, K_e, m).storage
-        return Stored(phi, dphi, arm.pose(phi, m), motors + springs + weight)
+        return Stored(phi, dphi, arm.pose(phi, m), motors, springs, weight)
+
+    def outer(
+        self, phi: cs.SX, q: cs.SX, reference: Reference, m: SimpleNamespace, g: SimpleNamespace
+    ) -> OuterLoop:
+        """Return (12) and (32) with their damping as a matrix, for whoever holds it implicitly."""
+        arm, rows = self.robot.arm, slice(0, self.task.size)
+        J = arm.jacobian(phi, m)[rows, :]
+        spring = self.task.spring(arm.pose(phi, m), reference.pose, g.stiffness)
+        weight = self.gravity.compensation(arm, phi, g.shaped_stiffness, m)
+        J_q = arm.jacobian(q, m)[rows, :]
+        null = null_space_damping(arm.mass_matrix(q, m), J_q, g.null_space_damping, g.regularisation)
+        cartesian = J.T @ g.damping @ J
+        return OuterLoop(weight.torque - J.T @ spring.gradient[rows], cartesian + null, cartesian)
 
     def command(
         self,

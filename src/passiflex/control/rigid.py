@@ -58,7 +58,7 @@ class RigidImpedanceLaw(AbstractLaw):
         """Return the real motors as they are measured, with what they and the real joints store."""
         arm, q, dq = self.robot.arm, y.theta, y.dtheta
         motors, springs = _joint_energies(y, m)
-        return Stored(q, dq, arm.pose(q, m), motors + springs - arm.potential_energy(q, m))
+        return Stored(q, dq, arm.pose(q, m), motors, springs, -arm.potential_energy(q, m))
 
     def command(
         self,

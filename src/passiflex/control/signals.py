@@ -92,13 +92,20 @@ class Stored(NamedTuple):
     ----------
     phi, dphi: Shaped motor coordinate of (11), (n,).
     pose: f(φ), where the Cartesian spring takes hold.
-    energy: ½ φ̇ᵀ B_e φ̇ + ½ (φ − q)ᵀ K_e (φ − q) − V_γ(φ).
+    motor_kinetic, joint_spring, gravity_storage: As in `LawEnergy`.
     """
 
     phi: cs.SX
     dphi: cs.SX
     pose: EndEffectorPose
-    energy: cs.SX
+    motor_kinetic: cs.SX
+    joint_spring: cs.SX
+    gravity_storage: cs.SX
+
+    @property
+    def energy(self) -> cs.SX:
+        """Return ½ φ̇ᵀ B_e φ̇ + ½ (φ − q)ᵀ K_e (φ − q) − V_γ(φ) [J]."""
+        return self.motor_kinetic + self.joint_spring + self.gravity_storage
 
 
 class Command(NamedTuple):

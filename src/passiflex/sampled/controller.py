@@ -16,6 +16,7 @@ from passiflex.robots.arm import EndEffectorPose
 from passiflex.sampled.actions import action_layout, posture_spring, tracking_wrench
 from passiflex.sampled.external import AbstractExternalTorque, Known, TrueTorque
 from passiflex.sampled.governor import govern_pose, govern_stiffness
+from passiflex.sampled.inner_loop import AbstractInnerLoop, PlainInnerLoop
 from passiflex.sampled.signals import ControlParameters, LedgerEntry, Step, Wish
 from passiflex.sampled.tank import AbstractTank, PeriodFlows, TankEntry, added, finite, unchanged
 
@@ -45,50 +46,68 @@ class SampledController:
     law: AbstractLaw
     tank: AbstractTank | None = None
     external: AbstractExternalTorque = field(default_factory=TrueTorque)
+    inner: AbstractInnerLoop = field(default_factory=PlainInnerLoop)
 
     @cached_property
     def parameters(self) -> tuple[Layout, ...]:
         """Return the layouts of `ControlParameters`, in its order."""
         robot, gains = self.law.robot, self.law.layout
         observer = Layout((Field("bandwidth", (), "rad/s", "of the external torque's estimator"),))
-        return robot.layout, gains, gains, AbstractTank.layout, action_layout(robot.n), observer
+        actions = action_layout(robot.n)
+        return robot.layout, gains, gains, AbstractTank.layout, actions, observer, AbstractInnerLoop.layout
 
     @cached_property
     def state(self) -> Layout:
         """Return what is remembered from one period to the next; energies are sums since the start."""
         n, k = self.law.robot.n, self.law.task.size
-        return Layout(
-            (
-                Field("governed_position", (3,), "m", "x̂_d, the reference in force"),
-                Field("governed_rotation", (3, 3), "1", "its axes"),
-                Field("held_stiffness", (k, k), "N/m, N, N m/rad", "K_x in force"),
-                Field("tank_energy", (), "J", "T"),
-                Field("law_storage", (), "J", "S after the last change of the reference"),
-                Field("variable_potential", (), "J", "U(K_x) − U(K_base)"),
-                Field("claimed_power", (), "W", "P_D that the law claims"),
-                Field("claimed_cartesian_power", (), "W", "its part in D_x"),
-                Field("last_q", (n,), "rad", "measured q of the last period"),
-                Field("last_tau_a", (n,), "N m", "measured τ_a of the last period"),
-                Field("last_command", (n,), "N m", "τ_m of the last period"),
-                Field("running", (), "1", "0 before the first period"),
-                Field("latched", (), "1", "1 once the law has fallen back"),
-                Field("measured_port_energy", (), "J", "Σ w"),
-                Field("reference_energy", (), "J", "Σ ΔU: stored by changes of reference and stiffness"),
-                Field("granted_energy", (), "J", "paid for changes of reference and stiffness"),
-                Field("drawn_energy", (), "J", "taken from the tank by the port"),
-                Field("refilled_energy", (), "J", "given to the tank"),
-                Field("spilled_energy", (), "J", "refused by the cap"),
-                Field("lowest_level", (), "J", "least T so far"),
-                Field("governed_time", (), "s", "in which the reference was held back"),
-                Field("faults", (), "1", "periods with a measurement that was not finite"),
+        return (
+            Layout(
+                (
+                    Field("governed_position", (3,), "m", "x̂_d, the reference in force"),
+                    Field("governed_rotation", (3, 3), "1", "its axes"),
+                    Field("held_stiffness", (k, k), "N/m, N, N m/rad", "K_x in force"),
+                    Field("tank_energy", (), "J", "T"),
+                    Field("law_storage", (), "J", "S after the last change of the reference"),
+                    Field("variable_potential", (), "J", "U(K_x) − U(K_base)"),
+                    Field("claimed_power", (), "W", "P_D that the law claims"),
+                    Field("claimed_cartesian_power", (), "W", "its part in D_x"),
+                    Field("last_q", (n,), "rad", "measured q of the last period"),
+                    Field("last_tau_a", (n,), "N m", "measured τ_a of the last period"),
+                    Field("last_command", (n,), "N m", "τ_m of the last period"),
+                    Field("running", (), "1", "0 before the first period"),
+                    Field("latched", (), "1", "1 once the law has fallen back"),
+                    Field("measured_port_energy", (), "J", "Σ w"),
+                    Field("reference_energy", (), "J", "Σ ΔU: stored by changes of reference and stiffness"),
+                    Field("granted_energy", (), "J", "paid for changes of reference and stiffness"),
+                    Field("drawn_energy", (), "J", "taken from the tank by the port"),
+                    Field("refilled_energy", (), "J", "given to the tank"),
+                    Field("spilled_energy", (), "J", "refused by the cap"),
+                    Field("lowest_level", (), "J", "least T so far"),
+                    Field("governed_time", (), "s", "in which the reference was held back"),
+                    Field("faults", (), "1", "periods with a measurement that was not finite"),
+                )
             )
-        ) + self.external.state(n)
+            + self.external.state(n)
+            + self.inner.state(n)
+        )
 
-    def step(self, y: Measurement, wish: Wish, elapsed: cs.SX, state: cs.SX, p: ControlParameters) -> Step:
-        """Return command, next state and ledger entry, `elapsed` seconds after the last period that ran."""
+    def step(
+        self,
+        y: Measurement,
+        wish: Wish,
+        elapsed: cs.SX,
+        given: cs.SX,
+        state: cs.SX,
+        p: ControlParameters,
+    ) -> Step:
+        """Return command, next state and ledger entry, `elapsed` seconds after the last period that ran.
+
+        `given` (n,) is the torque that the motors were told then, after their limits.
+        """
         arm, s = self.law.robot.arm, self.state.view(state)
         ok = finite(*y, wish.pose.position, wish.pose.rotation, wish.stiffness, wish.damping, wish.wrench)
         y, observed = self.external.estimate(y, elapsed, Known(arm, p.m, p.observer.bandwidth), s)
+        y, seen = self.inner.see(y, given, elapsed, s, p.m, p.inner)
         first = s.running < 1
 
         held = EndEffectorPose(s.governed_position, s.governed_rotation)
@@ -124,7 +143,8 @@ class SampledController:
         if self.tank:
             brake = self.tank.braking(granted.entry.level, cs.dot(now.dphi, now.dphi), elapsed, p.tank)
             torque -= brake * now.dphi
-        command = self.law.command(y, Reference(granted.pose, wish.velocity), p.m, g, torque)
+        reference, memory = Reference(granted.pose, wish.velocity), self.inner.state(self.law.robot.n)
+        command = self.inner.command(self.law, y, reference, p.m, g, torque, memory.view(seen), p.inner)
 
         tank = added(settled, granted.entry)
         held_back = cs.logic_or(granted.pose_share < 1, granted.stiffness_share < 1)
@@ -153,7 +173,7 @@ class SampledController:
             "faults": s.faults + tank.fault,
         }
         own = Layout(self.state.fields[: len(values)])
-        after = cs.vertcat(own.stack(values), observed)
+        after = cs.vertcat(own.stack(values), observed, seen)
         faulty = self.state.stack(vars(s) | {"faults": s.faults + 1})
         entry = LedgerEntry(
             tank=tank,

@@ -74,6 +74,7 @@ class ControlParameters(NamedTuple):
     tank: `AbstractTank.layout`.
     actions: `action_layout`.
     observer: `bandwidth` of the external torque's estimator.
+    inner: `AbstractInnerLoop.layout`.
     """
 
     m: SimpleNamespace
@@ -82,3 +83,4 @@ class ControlParameters(NamedTuple):
     tank: SimpleNamespace
     actions: SimpleNamespace
     observer: SimpleNamespace
+    inner: SimpleNamespace

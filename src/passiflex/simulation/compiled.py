@@ -83,7 +83,7 @@ def compiled_sampled_loop(controller: SampledController) -> CompiledSampledLoop:
     law = controller.law
     key = (
         law.robot.arm.chain.to_urdf(), type(law), law.task, law.gravity,
-        type(controller.tank), controller.external,
+        type(controller.tank), controller.external, controller.inner,
     )  # fmt: skip
     if key not in _built_sampled:
         loop = SampledLoop(controller)

@@ -46,9 +46,10 @@ class Control(Section):
     missed: Annotated[float, Quantity("1", least=0, most=0.9)] = Field(
         default=0.0, description="share of periods in which the law does not run, at random"
     )
-    inner_loop: Literal["plain", "predicted"] = Field(
+    inner_loop: Literal["plain", "matched"] = Field(
         default="plain",
-        description="plain: the continuous law at the sample; predicted: at the state in which its command acts",
+        description="plain: the continuous law at the sample; matched: predicted over the delay, and matched "
+        "to the shaped motor at the end of the hold",
     )
     external_torque: Literal["true", "measured", "observer", "none"] = Field(
         default="measured",

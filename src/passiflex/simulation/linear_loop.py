@@ -36,6 +36,7 @@ IDEAL = {
 REMEMBERED = (
     "read_q", "read_theta", "read_dq", "read_dtheta", "read_tau_a", "read_wrench",
     "observed_torque", "momentum", "known_torque",
+    "seen_theta", "seen_deflection", "seen_dq", "seen_ddq", "in_flight", "given_torque",
 )  # fmt: skip
 """The memory that acts back on the command; the tank does not while it is full."""
 
@@ -177,7 +178,7 @@ class LinearLoop:
         """Return the derivative of (memory, command) by (x, memory) of one period at rest."""
         control = self.compiled.control
         own = self.parts.gains.unpack(self.problem.gains) | (gains or {})
-        numbers = self._replaced(self.numbers, own, "gains")
+        numbers = self._replaced(self._replaced(self.numbers, own, "gains"), {"period": period}, "inner")
         memory, row = self._at_rest(own, period)
         n_x = self.x.size
 
@@ -214,6 +215,9 @@ class LinearLoop:
             "last_tau_a": tau_a,
             "known_torque": tau_a - weight,
             "observing": 1.0,
+            "seen": 1.0,
+            "seen_theta": p.theta,
+            "seen_deflection": tau_a / K,
             "last_command": self.s.held,
             "given_torque": self.s.held,
         }
@@ -224,6 +228,7 @@ class LinearLoop:
             "desired_damping": gains["damping"],
             "elapsed": period,
         }
+        known |= {f.name: np.tile(self.s.held, (f.shape[0], 1)) for f in loop.memory if f.name == "in_flight"}
         return _packed(loop.memory, known), _packed(loop.row, row)
 
     def _replaced(self, numbers: Array, values: dict[str, Any], only: str | None = None) -> Array:

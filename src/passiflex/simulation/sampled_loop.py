@@ -30,6 +30,7 @@ class Parts(NamedTuple):
     tank: Layout
     actions: Layout
     observer: Layout
+    inner: Layout
     sensors: Layout
     limits: Layout
 
@@ -58,9 +59,9 @@ class SampledLoop:
     def parameters(self) -> Parts:
         """Return the layouts of everything that `control` is told."""
         n = self.controller.law.robot.n
-        model, gains, fallback, tank, actions, observer = self.controller.parameters
+        model, gains, fallback, tank, actions, observer, inner = self.controller.parameters
         plant, sensors, limits = self.plant.parameters, self.sensors.layout, limit_layout(n)
-        return Parts(plant, model, gains, fallback, tank, actions, observer, sensors, limits)
+        return Parts(plant, model, gains, fallback, tank, actions, observer, inner, sensors, limits)
 
     @cached_property
     def memory(self) -> Layout:
@@ -159,7 +160,7 @@ class SampledLoop:
         told = ControlParameters(*(getattr(views, part) for part in Parts._fields[1:-2]))
         start = self.sensors.state.size
         own = memory[start : start + self.controller.state.size]
-        command, after, entry, believed = self.controller.step(y, wish, w.elapsed, own, told)
+        command, after, entry, believed = self.controller.step(y, wish, w.elapsed, c.given_torque, own, told)
         limits = views.limits
         given = limited(
             command.tau_m, c.given_torque, limits.torque_limit, limits.torque_rate_limit, w.elapsed

@@ -1,0 +1,101 @@
+"""How the law's torque becomes a held command: as in continuous time, or matched to the end of the hold."""
+
+from __future__ import annotations
+
+import abc
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import NamedTuple, final
+
+import casadi as cs
+
+from passiflex.control.law import AbstractLaw
+from passiflex.control.signals import Command, Measurement, Reference
+from passiflex.layout import Field, Layout
+
+
+class Seen(NamedTuple):
+    """The measurement as the inner loop makes it better, and what it remembers."""
+
+    measured: Measurement
+    state: cs.SX
+
+
+class AbstractInnerLoop(abc.ABC):
+    """Turns measurement, reference and gains into the command of one period."""
+
+    layout = Layout(
+        (
+            Field("period", (), "s", "nominal control period"),
+            Field(
+                "velocity_gain", (), "1", "g: share of the new difference in the link velocity, per period"
+            ),
+            Field("acceleration_gain", (), "1", "b: share of the new value in the acceleration, per period"),
+        )
+    )
+
+    @abc.abstractmethod
+    def state(self, n: int) -> Layout:
+        """Return what is remembered from one period to the next."""
+
+    @abc.abstractmethod
+    def see(
+        self,
+        y: Measurement,
+        given: cs.SX,
+        elapsed: cs.SX,
+        s: SimpleNamespace,
+        m: SimpleNamespace,
+        i: SimpleNamespace,
+    ) -> Seen:
+        """Return the measurement to work with; `given` is the torque that the motors were told last."""
+
+    @abc.abstractmethod
+    def command(
+        self,
+        law: AbstractLaw,
+        y: Measurement,
+        reference: Reference,
+        m: SimpleNamespace,
+        g: SimpleNamespace,
+        added: cs.SX,
+        seen: SimpleNamespace,
+        i: SimpleNamespace,
+    ) -> Command:
+        """Return the command, with `added` as further torque on the shaped motors."""
+
+
+@final
+@dataclass(frozen=True)
+class PlainInnerLoop(AbstractInnerLoop):
+    """The continuous law, evaluated at the sample and held."""
+
+    def state(self, n: int) -> Layout:
+        """Return nothing."""
+        return Layout(())
+
+    def see(
+        self,
+        y: Measurement,
+        given: cs.SX,
+        elapsed: cs.SX,
+        s: SimpleNamespace,
+        m: SimpleNamespace,
+        i: SimpleNamespace,
+    ) -> Seen:
+        """Return y as it is."""
+        return Seen(y, cs.SX(0, 1))
+
+    def command(
+        self,
+        law: AbstractLaw,
+        y: Measurement,
+        reference: Reference,
+        m: SimpleNamespace,
+        g: SimpleNamespace,
+        added: cs.SX,
+        seen: SimpleNamespace,
+        i: SimpleNamespace,
+    ) -> Command:
+        """Return the law's own command."""
+        return law.command(y, reference, m, g, added)
