@@ -91,14 +91,18 @@ class HeldLoop:
     """
 
     def __init__(self, plant: cs.Function, control: cs.Function, library: Path | None = None):
+        if not _fit(plant, control):
+            raise SizeError(
+                "plant and control do not fit",
+                got=f"{plant}, {control}",
+                needs="(x, [command, surroundings], p) -> (dx, dquad) and (x, c, row, p) -> (c, command, signals), "
+                "dense columns",
+            )
         self.n_x, inputs, self.n_p = (plant.size1_in(i) for i in range(3))
         _, self.n_c, self.n_w, self.n_p_control = (control.size1_in(i) for i in range(4))
         self.n_q, self.n_u, self.n_z = plant.size1_out(1), control.size1_out(1), control.size1_out(2)
         self.n_s = inputs - self.n_u
-        if control.size1_in(0) != self.n_x or not 0 <= self.n_s <= self.n_w:
-            raise SizeError(
-                "plant and control do not fit", got=f"{plant}, {control}", needs="the loop of `held_loop.c`"
-            )
+        self.n_line = 1 + self.n_u + LONGEST_LINE * (1 + self.n_u)
         self._plant = Entry(library, plant.name()) if library is not None else None
         self._control = Entry(library, control.name()) if library is not None else None
         if self._plant is not None:
@@ -108,7 +112,7 @@ class HeldLoop:
 
     def start(self, x: ArrayLike, controller: ArrayLike, command: ArrayLike) -> LoopState:
         """Return the state before the first sample, with `command` in force."""
-        line = np.zeros(1 + self.n_u + LONGEST_LINE * (1 + self.n_u))
+        line = np.zeros(self.n_line)
         line[1 : 1 + self.n_u] = _column("command", command, self.n_u)
         return LoopState(
             _column("x", x, self.n_x),
@@ -138,7 +142,7 @@ class HeldLoop:
         state: From `start`, or from the call before.
         rows: Inputs (N, n_w); row i holds during period i.
         timing: (N, 2): delay of the command of each sample [s] ≥ 0, and whether the controller runs (0, 1).
-        period: [s].
+        period: [s]; the same from `start` on.
         longest: Longest step of the plant [s].
         record_every: Samples from one recorded to the next.
         last: True if the last row is a sample only, with no period after it.
@@ -157,8 +161,9 @@ class HeldLoop:
         for name, value in (("period", period), ("longest", longest)):
             if not (value > 0 and math.isfinite(value)):
                 raise ValueRangeError(name, got=value, needs="a positive time in s")
-        if record_every < 1:
+        if record_every < 1 or record_every % 1:
             raise ValueRangeError("record_every", got=record_every, needs="a whole number, at least 1")
+        record_every = int(record_every)
         if timing.size and not 0 <= timing[:, 0].min() <= timing[:, 0].max() < (LONGEST_LINE - 2) * period:
             raise ValueRangeError(
                 "delay of a command",
@@ -171,8 +176,10 @@ class HeldLoop:
         )
         width = self.n_x + self.n_q + self.n_c + self.n_u + self.n_z
         out = np.full((-(-len(rows) // record_every), width), np.nan)
-        y = np.concatenate([state.x, state.quads])
-        c, line, z = state.controller.copy(), state.line.copy(), state.signals.copy()
+        sizes = (self.n_x, self.n_q, self.n_c, self.n_line, self.n_z)
+        parts = zip(LoopState._fields, state, sizes, strict=True)
+        x, quads, c, line, z = (_column(f"{name} of the state", *rest) for name, *rest in parts)
+        y = np.concatenate([x, quads])
         run = self._in_machine if self._plant is None else self._in_c
         steps = len(rows) - last
         completed = run(
@@ -263,6 +270,24 @@ class HeldLoop:
             if not np.isfinite(y).all():
                 return k
         return len(rows)
+
+
+def _fit(plant: cs.Function, control: cs.Function) -> bool:
+    """Return whether the two are what `HeldLoop` says."""
+    if (plant.n_in(), plant.n_out(), control.n_in(), control.n_out()) != (3, 2, 4, 3):
+        return False
+    parts = [
+        part(i)
+        for f in (plant, control)
+        for part, count in ((f.sparsity_in, f.n_in()), (f.sparsity_out, f.n_out()))
+        for i in range(count)
+    ]
+    return (
+        all(part.is_dense() and part.size2() == 1 for part in parts)
+        and plant.size1_in(0) == plant.size1_out(0) == control.size1_in(0)
+        and control.size1_in(1) == control.size1_out(0)
+        and 0 <= plant.size1_in(1) - control.size1_out(1) <= control.size1_in(2)
+    )
 
 
 def _column(name: str, value: ArrayLike, size: int) -> Array:

@@ -105,7 +105,7 @@ class SampledController:
         `given` (n,) is the torque that the motors were told then, after their limits.
         """
         arm, s = self.law.robot.arm, self.state.view(state)
-        ok = finite(*y, wish.pose.position, wish.pose.rotation, wish.stiffness, wish.damping, wish.wrench)
+        ok = finite(elapsed, given, *y, *wish.pose, *wish[1:])
         y, observed = self.external.estimate(y, elapsed, Known(arm, p.m, p.observer.bandwidth), s)
         y, seen = self.inner.see(y, given, elapsed, s, p.m, p.inner)
         first = s.running < 1
@@ -134,7 +134,7 @@ class SampledController:
         held = _pose(overdrawn, now.pose, held)
         held_stiffness = cs.if_else(overdrawn, p.fallback.stiffness, s.held_stiffness)
         restored = cs.if_else(overdrawn, now.energy, storage)  # the spring is slack at the pose just read
-        settled = settled._replace(level=settled.level + storage - restored)
+        settled = settled._replace(level=settled.level + cs.if_else(overdrawn, storage - restored, 0))
 
         granted = self._grant(now, held, held_stiffness, wish, latched, settled.level, elapsed, p)
         valve = (1 - latched) * self.tank.valve(granted.entry.level, p.tank) if self.tank else cs.SX(1)
