@@ -117,7 +117,7 @@ class HeldLoop:
         return LoopState(
             _column("x", x, self.n_x),
             np.zeros(self.n_q),
-            _column("c", controller, self.n_c),
+            _column("controller", controller, self.n_c),
             line,
             np.full(self.n_z, np.nan),
         )

@@ -6,5 +6,6 @@ from passiflex.passivity.audit import available_energy as available_energy
 from passiflex.passivity.ledger import Balance as Balance
 from passiflex.passivity.ledger import claimed_balance as claimed_balance
 from passiflex.passivity.ledger import link_balance as link_balance
+from passiflex.passivity.ledger import overclaimed as overclaimed
 from passiflex.passivity.ledger import port_tank as port_tank
 from passiflex.passivity.ledger import robot_balance as robot_balance

@@ -14,6 +14,7 @@ from passiflex.passivity.ledger import (
     initial_tank,
     link_balance,
     motor_side_storage,
+    overclaimed,
     port_energy,
     robot_balance,
 )
@@ -41,7 +42,8 @@ class Audit:
     term: What took most of the energy by then.
     margin: Least of S̃₀ + T₀ − W̃ over the run [J]; negative by the largest overdraft.
     integration_error: Largest residual of the links' balance, which holds whatever the law [J].
-    books_error: Largest residual of the law's own books (28)–(29) [J]; round-off if its model is right.
+    books_error: How wrong the law's own books are [J]: the largest residual of (28)–(29), round-off if its
+        model is right; of a sampled law, the most that its tank claims beyond what is there.
     ledger_residual: Largest residual of the real robot's balance (4) [J].
     remedy: What to do about it.
     """
@@ -66,12 +68,16 @@ def audit(run: Run) -> Audit:
     """Return the audit of a run."""
     robot, links, law = robot_balance(run), link_balance(run), claimed_balance(run)
     error = np.maximum.accumulate(np.abs(links.residual))
-    round_off = ROUND_OFF * max(1.0, float(links.total.max()))
+    round_off = ROUND_OFF * np.maximum(1.0, np.maximum.accumulate(np.abs(links.total)))
     margin = available_energy(run)
     verdict: Verdict
     if (margin < -error - round_off).any():
         verdict, decided = "violated", int(np.argmax(margin < -error - round_off))
-        remedy = "lower the gains, give the tank more to start with, or correct the law's model"
+        remedy = (
+            "see `passiflex limits` for the gains that hold at this rate"
+            if run.sampled
+            else "lower the gains, give the tank more to start with, or correct the law's model"
+        )
     elif run.failure:
         verdict, decided = "inconclusive", int(np.argmin(margin))
         remedy = f"the run ended early: {run.failure}"
@@ -86,7 +92,7 @@ def audit(run: Run) -> Audit:
         term=_deciding_term(run, law, decided),
         margin=float(margin.min()),
         integration_error=links.worst,
-        books_error=law.worst,
+        books_error=max(0.0, float(overclaimed(run).max())) if run.sampled else law.worst,
         ledger_residual=robot.worst,
         remedy=remedy,
         balances=(robot, links, law),

@@ -86,7 +86,7 @@ def robot_balance(run: Run) -> Balance:
             "gravity": run["potential_energy"],
         },
         {"environment": "external", "motor torque": "motor"},
-        {"joint dampers": "joint_loss"},
+        {"joint dampers": "joint_loss"} | ({"motor friction": "friction"} if run.sampled else {}),
     )
 
 
@@ -105,8 +105,16 @@ def claimed_balance(run: Run) -> Balance:
     """Return the law's own books: 𝓗₂ of (28) with (29), links included.
 
     They close if the law's model is right. The residual is the energy that the books miss: of model
-    errors, of noise, of whatever the law does not know.
+    errors, of noise, of whatever the law does not know. A sampled law keeps books at its joints instead:
+    T + S against Σw, as measured.
     """
+    if run.sampled:
+        return Balance(
+            "law",
+            {"tank": run["tank_energy"] * run.data.attrs["has_tank"], "law": run["law_storage"]},
+            {"joints, as measured": -run["measured_port_energy"]},
+            {"spilled": run["spilled_energy"]},
+        )
     return Balance.of(
         run,
         "law",
@@ -153,6 +161,11 @@ def port_tank(run: Run) -> Array:
     """
     stored = motor_side_storage(run)
     return initial_tank(run) - (stored - stored[0]) - port_energy(run)
+
+
+def overclaimed(run: Run) -> Array:
+    """Return by how much the level that the tank claims exceeds what is there, T − T_port [J]."""
+    return run["tank_energy"] * run.data.attrs["has_tank"] - port_tank(run)
 
 
 def initial_tank(run: Run) -> float:

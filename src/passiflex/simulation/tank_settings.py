@@ -11,6 +11,10 @@ from passiflex.simulation.section import Mistakes, Section
 
 Energy = Annotated[float, Quantity("J", least=0)]
 
+PAPER_DEFAULTS = {"accounting": "paper"}
+PORT_DEFAULTS = {"accounting": "signed", "floor": 0.1, "low": 0.2}
+"""What goes with a kind of tank. The port tank measures: its floor stands above the error of that."""
+
 
 class TankSettings(Section):
     """The energy tank that pays for the motion of the reference."""
@@ -19,8 +23,13 @@ class TankSettings(Section):
     fill: Annotated[float, Quantity("1", least=0, most=1)] = Field(
         default=1.0, description="share α of the dissipated power that fills the tank, 0 to 1"
     )
-    floor: Energy = Field(default=0.01, description="level that the reference never draws below, J")
-    low: Energy = Field(default=0.05, description="level below which the reference slows down, J")
+    floor: Energy = Field(
+        default=0.01, description="level that the reference never draws below, J; 0.1 J for the port tank"
+    )
+    low: Energy = Field(
+        default=0.05,
+        description="level below which the reference slows down and the valve closes, J; 0.2 J for the port tank",
+    )
     cap: Annotated[float, Quantity("J", least=0, finite=False)] = Field(
         default=float("inf"), description="level above which energy is spilled, J; inf for none"
     )
@@ -66,9 +75,9 @@ class TankSettings(Section):
 
     def completed(self, kind: Literal["paper", "port"]) -> Self:
         """Return the settings with `kind` and the accounting that goes with it, where they were left out."""
-        kind_ = self.kind or kind
-        accounting = self.accounting or ("signed" if kind_ == "port" else "paper")
-        return self.model_copy(update={"kind": kind_, "accounting": accounting})
+        given = self.model_dump(exclude_unset=True, exclude_none=True)
+        defaults = PORT_DEFAULTS if given.get("kind", kind) == "port" else PAPER_DEFAULTS
+        return type(self).model_validate({"kind": kind} | defaults | given)
 
     @property
     def signed(self) -> bool:
