@@ -30,7 +30,7 @@ def reproduce(
         bool, cyclopts.Parameter(negative="", help="sweep what the paper does not print")
     ] = False,
 ) -> int:
-    """Reproduce the paper's figures: fig1, fig2, fig3; all of them if none is named.
+    """Reproduce the paper's figures, fig1, fig2, fig3 (all if none is named), or the study `sampled`.
 
     Writes per figure a PNG, a PDF and the runs as netCDF, and one summary.json. With --sensitivity, one
     figure that shows how the conclusions move with what the paper does not print.

@@ -46,7 +46,9 @@ _FULL = Annotated[Matrix, Quantity("", ((3, 3), (6, 6))), AfterValidator(_defini
 class _Shaped(Section):
     """A joint quantity that the inner loop makes: a multiple of the law's own, or numbers."""
 
-    ratio: Positive | None = Field(default=None, description="multiple of the law's own value")
+    ratio: Annotated[float | Vector, Quantity("1", ((), (None,)), above=0)] | None = Field(
+        default=None, description="multiple of the law's own value, one number for all joints or one each"
+    )
     value: float | Vector | None = Field(default=None, description="one number for all joints, or one each")
 
     @model_validator(mode="before")
@@ -64,7 +66,9 @@ class _Shaped(Section):
     def resolve(self, own: ArrayLike) -> NDArray[np.float64]:
         """Return the values (n,) for the law's `own` ones (n,)."""
         own = np.asarray(own, dtype=float)
-        return own * self.ratio if self.value is None else np.array(np.broadcast_to(self.value, own.shape))
+        if self.value is None:
+            return own * np.broadcast_to(np.asarray(self.ratio), own.shape)
+        return np.array(np.broadcast_to(self.value, own.shape))
 
 
 class ShapedStiffness(_Shaped):

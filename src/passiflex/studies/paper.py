@@ -6,6 +6,9 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from importlib import resources
 
+import numpy as np
+from numpy.typing import NDArray
+
 from passiflex.control.law import ImpedanceLaw
 from passiflex.errors import NameUnknownError
 from passiflex.simulation import Problem, Run, Scenario, parse_scenario, resolve, simulate_problem
@@ -93,7 +96,7 @@ def run_case(scenario: Scenario, *, compared: bool, report: Report = lambda text
         for name, aware in (("baseline", False), ("baseline_motor_aware", True)):
             report(f"{scenario.name}: {name.replace('_', ' ')}")
             runs[name] = simulate_problem(resolve(with_baseline(scenario, motor_aware=aware)))
-    return Case(scenario.name, scenario, runs, _ideals(problem, runs["proposed"]))
+    return Case(scenario.name, scenario, runs, ideals(problem, runs["proposed"].time))
 
 
 def figure_cases(figure: str, report: Report = lambda text: None) -> Iterator[Case]:
@@ -115,7 +118,8 @@ def figure_cases(figure: str, report: Report = lambda text: None) -> Iterator[Ca
         yield run_case(variant, compared=compared, report=report)
 
 
-def _ideals(problem: Problem, run: Run) -> dict[str, IdealResponse]:
+def ideals(problem: Problem, time: NDArray[np.float64]) -> dict[str, IdealResponse]:
+    """Return the ideal responses, for 3.40 kg and for Λ(q₀), at instants that cover a problem's events."""
     assert isinstance(problem.law, ImpedanceLaw)
     gains = problem.law.layout.unpack(problem.gains)
     stiffness, damping = gains["stiffness"], gains["damping"]
@@ -124,6 +128,6 @@ def _ideals(problem: Problem, run: Run) -> dict[str, IdealResponse]:
         "msd_natural": natural_inertia(problem),
     }
     return {
-        name: ideal_response(inertia, stiffness, damping, problem.events, run.time)
+        name: ideal_response(inertia, stiffness, damping, problem.events, time)
         for name, inertia in inertias.items()
     }

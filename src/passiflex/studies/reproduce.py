@@ -21,8 +21,10 @@ from passiflex.simulation.law_settings import ImpedanceSettings
 from passiflex.simulation.run import package_version, source_commit
 from passiflex.simulation.scenario import Circle, Step
 from passiflex.studies.paper import FIGURES, Case, Report, figure_cases
+from passiflex.studies.sampled import reproduce_sampled
 from passiflex.studies.summary import displacement, summarise
 
+SAMPLED = "sampled"
 TITLES = {
     "robot": "gravity: the robot's own compensation\n(as in the paper)",
     "static": "gravity in plant and law\n(static compensation by the law's model)",
@@ -32,7 +34,9 @@ TITLES = {
 def reproduce(
     figures: Sequence[str], folder: Path, report: Report = lambda text: None
 ) -> dict[str, list[Path]]:
-    """Run the given figures (all if empty), and return what was written into `folder`, by figure.
+    """Run the given figures, and return what was written into `folder`, by figure.
+
+    The paper's three if none is given; `sampled` is the study of the sampled world.
 
     Each figure gives a PNG, a PDF and its runs as netCDF; all give their part of `summary.json`, which
     keeps what earlier calls wrote about other figures of the same version.
@@ -40,15 +44,19 @@ def reproduce(
     Raises
     ------
     NameUnknownError
-        For a figure that the paper does not have.
+        For a figure that there is not.
     """
     for name in figures:
-        if name not in FIGURES:
-            raise NameUnknownError("figure", name, FIGURES)
+        if name not in (*FIGURES, SAMPLED):
+            raise NameUnknownError("figure", name, (*FIGURES, SAMPLED))
     require_writable(folder)
     written: dict[str, list[Path]] = {}
     summary: dict[str, Any] = {}
     for name in figures or FIGURES:
+        if name == SAMPLED:
+            written[name], numbers = reproduce_sampled(folder, report)
+            summary |= numbers
+            continue
         cases = list(figure_cases(name, report))
         summary |= {case.name: summarise(case) for case in cases}
         report(f"{name}: drawing and writing")

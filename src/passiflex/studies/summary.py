@@ -40,7 +40,7 @@ def summarise(case: Case) -> dict[str, Any]:
     """Return the numbers of one case, ready for JSON: what is not finite is null."""
     turning = any(isinstance(e, Circle) for e in case.scenario.reference)
     numbers = _circle(case) if turning else _steps(case)
-    return _plain(numbers)
+    return plain(numbers)
 
 
 def displacement(run: Run) -> Array:
@@ -120,9 +120,10 @@ def _audited(run: Run) -> dict[str, Any]:
     }
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
+    """Return the value ready for JSON: what is not finite is null."""
     if isinstance(value, dict):
-        return {k: _plain(v) for k, v in value.items()}
+        return {k: plain(v) for k, v in value.items()}
     if isinstance(value, str):
         return value
     return float(value) if math.isfinite(value) else None
