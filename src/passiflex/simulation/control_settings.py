@@ -18,6 +18,8 @@ Angle = Annotated[float, Quantity("rad", least=0)]
 Share = Annotated[float, Quantity("1", least=0, most=1)]
 PerJoint = ((), (None,))
 ENDLESS = float("inf")
+MOST_PERIODS = 20
+"""Longest delay, in control periods; a loop that is later controls nothing."""
 
 
 class Fallback(Section):
@@ -62,6 +64,15 @@ class Control(Section):
     insist: bool = Field(
         default=False, description="run the law even at a rate and delay at which it is unstable"
     )
+
+    @model_validator(mode="after")
+    def _few_on_their_way(self) -> Self:
+        periods = (self.delay + self.jitter) * self.rate
+        if periods > MOST_PERIODS:
+            raise Mistakes(
+                (("delay",), f"with jitter at most {MOST_PERIODS} periods; got {periods:.4g} periods")
+            )
+        return self
 
 
 class SensorSettings(Section):

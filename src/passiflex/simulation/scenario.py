@@ -204,6 +204,13 @@ class Scenario(Section):
             )
         return tank.completed("port" if sampled else "paper")
 
+    @field_validator("control")
+    @classmethod
+    def _inner_loop_of_the_law(cls, control: Control | None, info: ValidationInfo) -> Control | None:
+        if control and control.inner_loop == "matched" and isinstance(info.data.get("law"), RigidSettings):
+            raise Mistakes((("inner_loop",), "the rigid law has no inner loop; take plain"))
+        return control
+
     @field_validator(*WITH_CONTROL)
     @classmethod
     def _only_sampled(cls, entry: Any, info: ValidationInfo) -> Any:

@@ -20,6 +20,7 @@ from passiflex.simulation.control_settings import Drag, MotorSettings
 from passiflex.simulation.law_settings import ImpedanceSettings
 from passiflex.simulation.scenario import Circle
 from passiflex.simulation.tank_settings import TankSettings
+from passiflex.studies.external_torque import external_torque_table
 from passiflex.studies.metrics import rms
 from passiflex.studies.msd import IdealResponse
 from passiflex.studies.paper import Report, ideals, shipped_scenario
@@ -166,6 +167,7 @@ def reproduce_sampled(folder: Path, report: Report = lambda text: None) -> tuple
             panels[task].append(_panel(case))
             kept = case.run if case.run.failure else case.run.every(SAVED)
             written.append(kept.save(folder / f"{case.name}.nc"))
+    summary["external_torque"] = external_torque_table(report)
     report("sampled: drawing")
     paths = save_figure(draw_sampled(list(panels.values()), CONDITIONS), folder / "sampled")
     return [*paths, *written], summary
