@@ -16,7 +16,7 @@ PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 EXAMPLES = ROOT / "docs" / "examples"
 FENCE = re.compile(r"^```(\w+)[^\n]*\n(.*?)^```", re.MULTILINE | re.DOTALL)
 SKIPPED = "<!-- no-run -->"
-ROOMS = "robots|phs|control|native|simulation|passivity|plotting|studies|cli|errors|layout|files"
+ROOMS = "robots|phs|control|sampled|native|simulation|passivity|limits|plotting|studies|cli|errors|layout|files"
 CODE_NAME = re.compile(rf"`((?:{ROOMS})(?:\.\w+)+)`")
 
 

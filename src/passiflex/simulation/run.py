@@ -31,7 +31,7 @@ AXES = {
     "wrench": ("component",),
     "governed_position": ("axis",),
     "governed_rotation": ("axis", "column"),
-    "held_stiffness": ("row", "component"),
+    "held_stiffness": ("task_row", "task_column"),
 }
 PHYSICAL = (
     "tank_energy",
