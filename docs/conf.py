@@ -10,7 +10,7 @@ project = "passiflex"
 author = "the passiflex authors"
 exclude_patterns = ["_build"]
 
-extensions = ["myst_parser", "sphinx.ext.autodoc", "mathml", "scenario_tables", "docstrings"]
+extensions = ["myst_parser", "sphinx.ext.autodoc", "mathml", "scenario_tables", "docstrings", "made_figures"]
 myst_enable_extensions = ["amsmath", "colon_fence", "deflist", "dollarmath"]
 myst_heading_anchors = 3
 default_role = "code"

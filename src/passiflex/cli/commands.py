@@ -6,11 +6,14 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import cyclopts
 from rich.console import Console
 from rich.table import Table
+
+if TYPE_CHECKING:
+    from passiflex.simulation import Run
 
 app = cyclopts.App(
     name="passiflex",
@@ -83,7 +86,8 @@ def audit(run: Path) -> int:
     from passiflex.passivity import audit as audit_run
     from passiflex.simulation.run import Run
 
-    result = audit_run(Run.load(run))
+    read = Run.load(run)
+    result = audit_run(read)
     table = Table(
         "balance", "change of stored energy", "supplied", "dissipated", "largest residual", title=str(run)
     )
@@ -98,9 +102,14 @@ def audit(run: Path) -> int:
     console.print(f"{decided} at {result.time:g} s, most of it taken by: {result.term}")
     console.print(f"margin: {result.margin:.6g} J, integration error {result.integration_error:.1e} J")
     if result.books_error > max(10 * result.integration_error, 1e-6):
-        console.print(
-            f"the law's own books are wrong by up to {result.books_error:.3g} J (model error or noise)"
+        wrong = (
+            "tank claims up to {:.3g} J beyond what is there"
+            if read.sampled
+            else ("law's own books are wrong by up to {:.3g} J (model error or noise)")
         )
+        console.print("the " + wrong.format(result.books_error))
+    if read.sampled:
+        _print_control(read)
     if result.verdict != "passive":
         console.print(f"remedy: {result.remedy}")
     return EXIT[result.verdict]
@@ -117,6 +126,17 @@ def robots() -> int:
         for quantity, source in description.sources.items():
             console.print(f"  {quantity}: {source}", markup=False)
     return 0
+
+
+def _print_control(run: Run) -> None:
+    """Print what governor and fallback did."""
+    governed, latched = run["governed_time"][-1], run["latched"] > 0
+    if governed > 0:
+        console.print(f"the governor held the reference back for {governed:.3g} s")
+    if latched.any():
+        console.print(f"the law fell back at {run.time[latched.argmax()]:.4g} s and held the pose it was in")
+    if run["faults"][-1] > 0:
+        console.print(f"{run['faults'][-1]:.0f} measurements were not finite, and changed nothing")
 
 
 def _refuse_target(scenario: Path, out: Path) -> None:
