@@ -20,6 +20,9 @@ from passiflex.sampled.inner_loop import AbstractInnerLoop, PlainInnerLoop
 from passiflex.sampled.signals import ControlParameters, LedgerEntry, Step, Wish
 from passiflex.sampled.tank import AbstractTank, PeriodFlows, TankEntry, added, finite, unchanged
 
+LARGEST_READING = 1e30
+"""A reading beyond it is no measurement: its energy could not be told from infinity."""
+
 
 class _Granted(NamedTuple):
     """The reference and stiffness in force, with what they cost."""
@@ -82,9 +85,16 @@ class SampledController:
                     Field("drawn_energy", (), "J", "taken from the tank by the port"),
                     Field("refilled_energy", (), "J", "given to the tank"),
                     Field("spilled_energy", (), "J", "refused by the cap"),
+                    Field("rebased_energy", (), "J", "given to T by S when the law fell back"),
                     Field("lowest_level", (), "J", "least T so far"),
                     Field("governed_time", (), "s", "in which the reference was held back"),
                     Field("faults", (), "1", "periods with a measurement that was not finite"),
+                    Field(
+                        "lost_time",
+                        (),
+                        "s",
+                        "since the last measurement that was finite, if it was not the last",
+                    ),
                 )
             )
             + self.external.state(n)
@@ -105,7 +115,8 @@ class SampledController:
         `given` (n,) is the torque that the motors were told then, after their limits.
         """
         arm, s = self.law.robot.arm, self.state.view(state)
-        ok = finite(elapsed, given, *y, *wish.pose, *wish[1:])
+        ok = finite(elapsed, given, *y, *wish.pose, *wish[1:], below=LARGEST_READING)
+        elapsed = s.lost_time + cs.if_else(finite(elapsed, below=LARGEST_READING), elapsed, 0)
         y, observed = self.external.estimate(y, elapsed, Known(arm, p.m, p.observer.bandwidth), s)
         y, seen = self.inner.see(y, given, elapsed, s, p.m, p.inner)
         first = s.running < 1
@@ -134,7 +145,8 @@ class SampledController:
         held = _pose(overdrawn, now.pose, held)
         held_stiffness = cs.if_else(overdrawn, p.fallback.stiffness, s.held_stiffness)
         restored = cs.if_else(overdrawn, now.energy, storage)  # the spring is slack at the pose just read
-        settled = settled._replace(level=settled.level + cs.if_else(overdrawn, storage - restored, 0))
+        rebased, lowest = cs.if_else(overdrawn, storage - restored, 0), settled.level
+        settled = settled._replace(level=settled.level + rebased)
 
         granted = self._grant(now, held, held_stiffness, wish, latched, settled.level, elapsed, p)
         valve = (1 - latched) * self.tank.valve(granted.entry.level, p.tank) if self.tank else cs.SX(1)
@@ -168,15 +180,18 @@ class SampledController:
             "drawn_energy": s.drawn_energy + tank.drawn,
             "refilled_energy": s.refilled_energy + tank.refilled,
             "spilled_energy": s.spilled_energy + tank.spilled,
-            "lowest_level": cs.fmin(s.lowest_level, tank.level),
+            "rebased_energy": s.rebased_energy + rebased,
+            "lowest_level": cs.fmin(s.lowest_level, cs.fmin(lowest, tank.level)),
             "governed_time": s.governed_time + cs.if_else(held_back, elapsed, 0),
-            "faults": s.faults + tank.fault,
+            "faults": s.faults + cs.fmin(tank.fault, 1),
+            "lost_time": 0,
         }
         own = Layout(self.state.fields[: len(values)])
         after = cs.vertcat(own.stack(values), observed, seen)
-        faulty = self.state.stack(vars(s) | {"faults": s.faults + 1})
+        faulty = self.state.stack(vars(s) | {"faults": s.faults + 1, "lost_time": elapsed})
         entry = LedgerEntry(
             tank=tank,
+            rebased=rebased,
             port_energy=work,
             storage=restored + granted.cost,
             reference_share=granted.pose_share,

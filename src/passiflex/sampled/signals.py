@@ -31,11 +31,15 @@ class Wish(NamedTuple):
 
 
 class LedgerEntry(NamedTuple):
-    """The energy of one period [J]; T + S + Σw + Σspilled is constant for the port tank.
+    """The energy of one period [J].
+
+    T + S + Σw + Σspilled is constant for the port tank, and for any tank
+    T = T₀ − Σgranted − Σdrawn + Σrefilled − Σspilled + Σrebased.
 
     Attributes
     ----------
     tank: What settled the period and what the reference was granted, as one entry.
+    rebased: What S gave to T in the period in which the law fell back, so that T + S did not jump.
     port_energy: w of the period.
     storage: S after the reference has moved.
     reference_share, stiffness_share: γ of the governor, 1 if nothing was held back.
@@ -45,6 +49,7 @@ class LedgerEntry(NamedTuple):
     """
 
     tank: TankEntry
+    rebased: cs.SX
     port_energy: cs.SX
     storage: cs.SX
     reference_share: cs.SX

@@ -104,9 +104,9 @@ class AbstractTank(abc.ABC):
         return smoothstep((level - g.tank_floor) / (g.tank_low - g.tank_floor))
 
 
-def finite(*numbers: cs.SX) -> cs.SX:
-    """Return 1 if all numbers are, else 0."""
-    flags = [cs.fabs(x) < LARGEST for number in numbers for x in cs.vertsplit(cs.vec(cs.SX(number)))]
+def finite(*numbers: cs.SX, below: float = LARGEST) -> cs.SX:
+    """Return 1 if all numbers are, and smaller than `below`, else 0."""
+    flags = [cs.fabs(x) < below for number in numbers for x in cs.vertsplit(cs.vec(cs.SX(number)))]
     result = cs.SX(1)
     for flag in flags:
         result = cs.logic_and(result, flag)

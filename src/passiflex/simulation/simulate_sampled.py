@@ -31,7 +31,7 @@ INTERNAL = (
     "started", "read_q", "read_theta", "read_dq", "read_dtheta", "read_tau_a", "read_wrench", "last_q",
     "last_tau_a", "last_command", "running", "given_torque", "claimed_power", "claimed_cartesian_power",
     "variable_potential", "seen", "seen_theta", "seen_deflection", "seen_dq", "seen_ddq", "in_flight",
-    "momentum", "known_torque", "observing",
+    "momentum", "known_torque", "observing", "lost_time",
 )  # fmt: skip
 """Memory of the controller that is of no interest to a reader, or is recorded under another name."""
 

@@ -1,0 +1,213 @@
+"""The gated actions against NumPy: a posture spring that the end effector does not feel, and a wrench that leads."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from types import SimpleNamespace
+
+import casadi as cs
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from loops import SEEDS, definite, robots
+from passiflex.robots.arm import SerialArm
+from passiflex.robots.catalogue import read_description
+from passiflex.robots.flexible import FlexibleJointRobot
+from passiflex.sampled.actions import action_layout, posture_spring, tracking_wrench
+
+SIZES = ((4, 3), (7, 6), (7, 3), (3, 2))
+"""(joints, rows of the task), with a null space."""
+
+each_size = pytest.mark.parametrize(("n", "k"), SIZES)
+
+
+@lru_cache
+def terms(arm: SerialArm) -> cs.Function:
+    q, (vector, m) = cs.SX.sym("q", arm.n), arm.layout.symbols("m")
+    return cs.Function("terms", [q, vector], [arm.mass_matrix(q, m), arm.jacobian(q, m)])
+
+
+@lru_cache
+def spring_function(n: int, k: int) -> cs.Function:
+    M, J = cs.SX.sym("M", n, n), cs.SX.sym("J", k, n)
+    phi, stiffness, posture, eps = (
+        cs.SX.sym(name, size) for name, size in {"f": n, "K": n, "p": n, "e": 1}.items()
+    )
+    return cs.Function(
+        "posture", [M, J, phi, stiffness, posture, eps], [posture_spring(M, J, phi, stiffness, posture, eps)]
+    )
+
+
+@lru_cache
+def wrench_function(n: int, k: int) -> cs.Function:
+    M, J, D = cs.SX.sym("M", n, n), cs.SX.sym("J", k, n), cs.SX.sym("D", k, k)
+    v, dv, eps, shares = (cs.SX.sym(name, size) for name, size in {"v": k, "a": k, "e": 1, "s": 2}.items())
+    a = SimpleNamespace(follow_velocity=shares[0], follow_acceleration=shares[1])
+    return cs.Function("follow", [M, J, D, v, dv, eps, shares], [tracking_wrench(M, J, D, v, dv, eps, a)])
+
+
+def spring(M: np.ndarray, J: np.ndarray, *numbers: np.ndarray | float) -> np.ndarray:
+    return np.array(spring_function(len(M), len(J))(M, J, *numbers)).ravel()
+
+
+def follow(M: np.ndarray, J: np.ndarray, *numbers: np.ndarray | float) -> np.ndarray:
+    return np.array(wrench_function(len(M), len(J))(M, J, *numbers)).ravel()
+
+
+def matrices(n: int, k: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """Return M with cond ≤ 100 and J with singular values in 0.3..1.5: cond(J M⁻¹ Jᵀ) ≤ 2500."""
+    left, _ = np.linalg.qr(rng.normal(size=(k, k)))
+    right, _ = np.linalg.qr(rng.normal(size=(n, n)))
+    return definite(rng, n, 0.1, 10), left @ np.diag(rng.uniform(0.3, 1.5, k)) @ right[:k]
+
+
+@each_size
+@settings(max_examples=20, deadline=None)
+@given(seed=SEEDS)
+def test_the_end_effector_does_not_feel_the_posture_spring(n: int, k: int, seed: int) -> None:
+    """J̄ᵀ τ = 0 with J̄ = M⁻¹ Jᵀ Λ, and no acceleration, J M⁻¹ τ = 0: to 1e-9 of a pull of 100 N m."""
+    rng = np.random.default_rng(seed)
+    M, J = matrices(n, k, rng)
+    stiffness, phi, posture = rng.uniform(0, 100, n), *rng.uniform(-1, 1, (2, n))
+    tau = spring(M, J, phi, stiffness, posture, 0.0)
+    J_bar = np.linalg.inv(M) @ J.T @ np.linalg.inv(J @ np.linalg.inv(M) @ J.T)
+    np.testing.assert_allclose(J_bar.T @ tau, 0, atol=1e-9)
+    np.testing.assert_allclose(J @ np.linalg.solve(M, tau), 0, atol=1e-9)
+    np.testing.assert_allclose(tau, (np.eye(n) - J.T @ J_bar.T) @ (stiffness * (posture - phi)), atol=1e-9)
+
+
+@each_size
+@settings(max_examples=20, deadline=None)
+@given(seed=SEEDS)
+def test_the_posture_spring_pulls_toward_the_posture(n: int, k: int, seed: int) -> None:
+    """Along a self-motion, J v = 0, its power is that of the whole spring: −d/dt ½ (φ_n − φ)ᵀ K_n (φ_n − φ).
+
+    And what it accelerates, M⁻¹ τ, is such a motion, toward the posture: τᵀ M⁻¹ τ > 0.
+    """
+    rng = np.random.default_rng(seed)
+    M, J = matrices(n, k, rng)
+    stiffness, phi, posture = rng.uniform(1, 100, n), *rng.uniform(-1, 1, (2, n))
+    tau = spring(M, J, phi, stiffness, posture, 0.0)
+    for v in np.linalg.svd(J)[2][k:]:
+        assert tau @ v == pytest.approx(stiffness * (posture - phi) @ v, rel=0, abs=1e-9)
+    v = np.linalg.solve(M, tau)
+    approach = stiffness * (posture - phi) @ v
+    assert approach == pytest.approx(tau @ v, rel=1e-9, abs=1e-9)
+    assert approach > 0
+
+
+@each_size
+@settings(max_examples=10, deadline=None)
+@given(seed=SEEDS)
+def test_no_stiffness_and_no_distance_are_no_torque(n: int, k: int, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    M, J = matrices(n, k, rng)
+    phi, posture, stiffness = rng.uniform(-1, 1, (3, n))
+    assert not spring(M, J, phi, 0 * phi, posture, 0.0).any()
+    assert not spring(M, J, phi, np.abs(stiffness), phi, 0.0).any()
+
+
+@each_size
+@settings(max_examples=20, deadline=None)
+@given(seed=SEEDS, exponent=st.floats(-6, 2))
+def test_with_regularisation_the_end_effector_feels_its_share(
+    n: int, k: int, seed: int, exponent: float
+) -> None:
+    """J M⁻¹ τ = ε Λ_ε J M⁻¹ K_n (φ_n − φ), exactly: all of the spring for a large ε, nothing for a small one."""
+    rng, eps = np.random.default_rng(seed), 10**exponent
+    M, J = matrices(n, k, rng)
+    stiffness, phi, posture = rng.uniform(0, 100, n), *rng.uniform(-1, 1, (2, n))
+    felt = J @ np.linalg.inv(M)
+    leak = eps * np.linalg.solve(felt @ J.T + eps * np.eye(k), felt @ (stiffness * (posture - phi)))
+    np.testing.assert_allclose(felt @ spring(M, J, phi, stiffness, posture, eps), leak, rtol=0, atol=1e-9)
+
+
+def test_an_arm_without_a_null_space_has_no_posture_spring() -> None:
+    """As many joints as rows: nothing is left to pull at."""
+    M, J = matrices(3, 3, np.random.default_rng(0))
+    tau = spring(M, J, np.zeros(3), np.full(3, 100.0), np.ones(3), 0.0)
+    np.testing.assert_allclose(tau, 0, atol=1e-9)
+
+
+@settings(max_examples=5, deadline=None)
+@given(robots(4, 6, prismatic=False), SEEDS)
+def test_the_posture_spring_of_an_arm_moves_its_elbow_alone(robot: FlexibleJointRobot, seed: int) -> None:
+    """From rest and without weight, q̈ = M⁻¹ τ: J q̈ = 0, and the distance to the posture shrinks."""
+    rng, arm = np.random.default_rng(seed), robot.arm
+    phi, posture = rng.uniform(-2, 2, (2, arm.n))
+    M, J = (np.array(v) for v in terms(arm)(phi, arm.layout.pack(arm.nominal())))
+    J = J[:3]
+    assume(np.linalg.cond(J @ np.linalg.inv(M) @ J.T) < 1e4)
+    tau = spring(M, J, phi, np.full(arm.n, 50.0), posture, 0.0)
+    ddq = np.linalg.solve(M, tau)
+    np.testing.assert_allclose(J @ ddq, 0, atol=1e-9 * np.abs(ddq).max())
+    assert (posture - phi) @ ddq > 0
+
+
+@pytest.mark.parametrize("eps", [0.0, 1e-2])
+@pytest.mark.parametrize("rows", [3, 6])
+@settings(max_examples=20, deadline=None)
+@given(seed=SEEDS)
+def test_the_tracking_wrench_is_its_formula(rows: int, eps: float, seed: int) -> None:
+    """v D_x ẋ_d + a Λ ẍ_d with Λ = (J M⁻¹ Jᵀ + ε I)⁻¹ of an iiwa; 1e-12 of it times cond(Λ) ≤ 1e4."""
+    rng, (f, numbers) = np.random.default_rng(seed), iiwa()
+    q = np.array([0, 0.6, 0, -1.2, 0, 1.0, 0]) + rng.uniform(-0.3, 0.3, 7)
+    M, J = (np.array(v) for v in f(q, numbers))
+    J = J[:rows]
+    D, (velocity, acceleration), shares = (
+        definite(rng, rows, 1, 100),
+        rng.normal(size=(2, rows)),
+        rng.uniform(0, 1, 2),
+    )
+    Lambda = np.linalg.inv(J @ np.linalg.inv(M) @ J.T + eps * np.eye(rows))
+    expected = shares[0] * (D @ velocity) + shares[1] * (Lambda @ acceleration)
+    ours = follow(M, J, D, velocity, acceleration, eps, shares)
+    np.testing.assert_allclose(ours, expected, rtol=0, atol=1e-8 * np.abs(expected).max())
+
+
+@lru_cache
+def iiwa() -> tuple[cs.Function, np.ndarray]:
+    arm = SerialArm(read_description("iiwa14").chain)
+    return terms(arm), arm.layout.pack(arm.nominal())
+
+
+@settings(max_examples=20, deadline=None)
+@given(SEEDS)
+def test_shares_switch_the_two_parts_of_the_wrench(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    M, J = matrices(7, 6, rng)
+    D, (velocity, acceleration) = definite(rng, 6, 1, 100), rng.normal(size=(2, 6))
+
+    def wrench(*shares: float) -> np.ndarray:
+        return follow(M, J, D, velocity, acceleration, 1e-3, np.array(shares))
+
+    assert not wrench(0, 0).any()
+    np.testing.assert_allclose(wrench(1, 0), D @ velocity, rtol=0, atol=1e-12 * 100)
+    np.testing.assert_allclose(wrench(1, 1), wrench(1, 0) + wrench(0, 1), rtol=0, atol=1e-12 * 100)
+    assert not follow(M, J, D, 0 * velocity, 0 * velocity, 1e-3, np.ones(2)).any()
+
+
+@settings(max_examples=20, deadline=None)
+@given(SEEDS)
+def test_with_the_tracking_wrench_the_end_effector_does_not_lag(seed: int) -> None:
+    """On the reference, with the law's −Jᵀ D_x J φ̇, M q̈ = Jᵀ (F − D_x ẋ) gives J q̈ = ẍ_d: Λ of the links.
+
+    For ẋ = ẋ_d the damper takes away what is fed forward, and J M⁻¹ Jᵀ Λ ẍ_d = ẍ_d is left.
+    """
+    rng = np.random.default_rng(seed)
+    M, J = matrices(7, 6, rng)
+    D, acceleration, dq = definite(rng, 6, 1, 100), rng.normal(size=6), rng.normal(size=7)
+    wrench = follow(M, J, D, J @ dq, acceleration, 0.0, np.ones(2))
+    ddq = np.linalg.solve(M, J.T @ (wrench - D @ (J @ dq)))
+    np.testing.assert_allclose(J @ ddq, acceleration, rtol=0, atol=1e-9)
+
+
+def test_the_layout_has_a_switch_for_each_action() -> None:
+    assert {f.name: f.size for f in action_layout(5)} == {
+        "posture_stiffness": 5,
+        "posture": 5,
+        "follow_velocity": 1,
+        "follow_acceleration": 1,
+    }
