@@ -22,7 +22,24 @@ def sampled(folder: Path) -> Path:
     return folder / "sampled.png"
 
 
-MAKERS: dict[str, Callable[[Path], Path]] = {"sampled.png": sampled}
+def limits(folder: Path) -> Path:
+    """Return the limit map of `fig1_sampled` with the continuous law at the samples and B_e = 0.3 B."""
+    from passiflex.limits import limit_map
+    from passiflex.plotting.figures import save_figure
+    from passiflex.plotting.limits import draw_limits
+    from passiflex.simulation import resolve
+    from passiflex.simulation.law_settings import ShapedInertia
+    from passiflex.studies import shipped_scenario
+
+    scenario = shipped_scenario("fig1_sampled")
+    control = scenario.control.model_copy(update={"inner_loop": "plain"})
+    law = scenario.law.model_copy(update={"shaped_inertia": ShapedInertia(ratio=0.3)})
+    found = limit_map(resolve(scenario.model_copy(update={"control": control, "law": law})))
+    save_figure(draw_limits(found), folder / "limits")
+    return folder / "limits.png"
+
+
+MAKERS: dict[str, Callable[[Path], Path]] = {"sampled.png": sampled, "limits.png": limits}
 
 
 def make(app: Sphinx) -> None:

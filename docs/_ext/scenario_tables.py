@@ -64,7 +64,7 @@ def written(field: FieldInfo) -> str:
         return f"{listed}, {' | '.join(kinds)}" if kinds else listed
     if choice := words(field):
         return " | ".join(choice)
-    return {str: "text", int: "whole number, ≥ 0"}[field.annotation]
+    return {str: "text", int: "whole number, ≥ 0", bool: "true | false"}[field.annotation]
 
 
 def default(field: FieldInfo) -> str:
@@ -80,7 +80,7 @@ def default(field: FieldInfo) -> str:
         return "inf" if math.isinf(value) else f"{value:g}"
     if isinstance(value, tuple):
         return f"[{', '.join(f'{v:g}' for v in value)}]"
-    return {"": "empty", None: "–"}.get(value, str(value))
+    return {"": "empty", None: "–", True: "true", False: "false"}.get(value, str(value))
 
 
 def _is_section(part: Any) -> bool:
