@@ -19,6 +19,7 @@ ROOMS = (
     "native",
     "simulation",
     "passivity",
+    "limits",
     "plotting",
     "studies",
     "cli",

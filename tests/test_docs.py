@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import re
+import shlex
 import shutil
 import textwrap
 from collections.abc import Iterator
@@ -16,7 +17,9 @@ PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 EXAMPLES = ROOT / "docs" / "examples"
 FENCE = re.compile(r"^```(\w+)[^\n]*\n(.*?)^```", re.MULTILINE | re.DOTALL)
 SKIPPED = "<!-- no-run -->"
-ROOMS = "robots|phs|control|sampled|native|simulation|passivity|limits|plotting|studies|cli|errors|layout|files"
+ROOMS = (
+    "robots|phs|control|sampled|native|simulation|passivity|limits|plotting|studies|cli|errors|layout|files"
+)
 CODE_NAME = re.compile(rf"`((?:{ROOMS})(?:\.\w+)+)`")
 
 
@@ -68,7 +71,7 @@ def test_commands_exist(block: str) -> None:
 
     targets = re.findall(r"^(\w+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE)
     for line in block.splitlines():
-        words = line.split("#")[0].split()
+        words = shlex.split(line, comments=True)
         if words[:1] == ["passiflex"]:
             app.parse_args(words[1:], print_error=False, exit_on_error=False)
         elif words[:1] == ["make"]:

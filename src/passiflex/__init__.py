@@ -6,7 +6,7 @@
     print(pf.audit(run).verdict)
 
 The rooms, in the order in which they may import each other: `robots`, `phs`, `control`, `native`,
-`simulation`, `passivity`, `studies`, `cli`; `plotting` draws what these produce.
+`simulation`, `passivity`, `limits`, `studies`, `cli`; `plotting` draws what these produce.
 """
 
 from __future__ import annotations
@@ -17,6 +17,9 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from passiflex.control import ImpedanceLaw as ImpedanceLaw
     from passiflex.control import RigidImpedanceLaw as RigidImpedanceLaw
+    from passiflex.limits import check as check
+    from passiflex.limits import limit_map as limit_map
+    from passiflex.limits import recommend as recommend
     from passiflex.passivity import Audit as Audit
     from passiflex.passivity import audit as audit
     from passiflex.phs import PortHamiltonianSystem as PortHamiltonianSystem
@@ -38,7 +41,10 @@ _ROOMS = {
     "Scenario": "simulation",
     "audit": "passivity",
     "catalogue": "robots",
+    "check": "limits",
+    "limit_map": "limits",
     "load_scenario": "simulation",
+    "recommend": "limits",
     "shipped_scenario": "studies",
     "simulate": "simulation",
 }

@@ -1,4 +1,4 @@
-"""The command line: `passiflex reproduce | simulate | audit | robots`."""
+"""The command line: `passiflex reproduce | simulate | audit | limits | robots`."""
 
 from __future__ import annotations
 

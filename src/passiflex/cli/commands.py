@@ -116,6 +116,53 @@ def audit(run: Path) -> int:
 
 
 @app.command
+def limits(
+    scenario: Path,
+    *,
+    rate: Annotated[
+        str | None, cyclopts.Parameter(help="control rate, as '1 kHz'; the scenario's own")
+    ] = None,
+    delay: Annotated[
+        str | None, cyclopts.Parameter(help="of a command, as '1 ms'; the scenario's own")
+    ] = None,
+    recommend: Annotated[
+        bool, cyclopts.Parameter(negative="", help="also find gains with a margin of 20 %")
+    ] = False,
+    out: Annotated[Path | None, cyclopts.Parameter(help="folder for limits.png and limits.pdf")] = None,
+) -> int:
+    """Say which gains a scenario's robot bears at its rate and delay: exit status 0 if its own are stable, 1 if not.
+
+    A scenario in continuous time needs --rate.
+    """
+    from passiflex.cli.limit_tables import border_table, confirmation_table
+    from passiflex.files import require_writable
+    from passiflex.limits import limit_map
+    from passiflex.limits.recommend_for import recommend_for
+    from passiflex.limits.subject import sampled_problem
+
+    with _timed():
+        with _progress() as report:
+            problem = sampled_problem(scenario, rate, delay)
+            if out is not None:
+                require_writable(out)
+            found = limit_map(problem, report=report)
+            advice = recommend_for(problem, report=report) if recommend else None
+        console.print(found.sentence)
+        console.print(border_table(found))
+        console.print(confirmation_table(found))
+        if advice is not None:
+            console.print(f"recommended: {advice.sentence}")
+            console.print(advice.snippet, markup=False)
+        if out is not None:
+            from passiflex.plotting.figures import save_figure
+            from passiflex.plotting.limits import draw_limits
+
+            for path in save_figure(draw_limits(found), out / "limits"):
+                console.print(f"wrote {path}")
+    return 0 if found.admissible.spectrum.stable else 1
+
+
+@app.command
 def robots() -> int:
     """List the robots of the catalogue, and where their numbers come from."""
     from passiflex.robots.catalogue import catalogue, read_description

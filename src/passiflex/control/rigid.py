@@ -15,6 +15,7 @@ from passiflex.control.null_space import inverse_cartesian_inertia, null_space_c
 from passiflex.control.signals import Command, LawEnergy, Measurement, Reference, Stored
 from passiflex.control.task import AbstractTask, PoseTask
 from passiflex.layout import Field, Layout
+from passiflex.robots.arm import SerialArm
 from passiflex.robots.flexible import FlexibleJointRobot
 from passiflex.robots.linear_algebra import solve_spd
 
@@ -75,7 +76,7 @@ class RigidImpedanceLaw(AbstractLaw):
         J_full = arm.jacobian(q, m)
         J = J_full[rows, :]
         dx = J @ dq
-        bias = cs.jtimes(dx, q, dq)  # J̇ q̇
+        bias = _task_bias(arm, rows, q, dq, m)  # J̇ q̇
         spring = self.task.spring(arm.pose(q, m), reference.pose, g.stiffness)
         mobility = inverse_cartesian_inertia(M, J, g.regularisation)
 
@@ -108,3 +109,12 @@ def _joint_energies(y: Measurement, m: SimpleNamespace) -> tuple[cs.SX, cs.SX]:
     """Return ½ θ̇ᵀ B θ̇ and ½ (θ − q)ᵀ K (θ − q) [J]."""
     stretch = y.theta - y.q
     return cs.dot(y.dtheta, m.motor_inertia * y.dtheta) / 2, cs.dot(stretch, m.joint_stiffness * stretch) / 2
+
+
+def _task_bias(arm: SerialArm, rows: slice, q: cs.SX, dq: cs.SX, m: SimpleNamespace) -> cs.SX:
+    """Return J̇ q̇ (k,), also where q and q̇ are expressions."""
+    angle, rate = cs.SX.sym("q", arm.n), cs.SX.sym("dq", arm.n)
+    free = cs.symvar(cs.vertcat(*(cs.vec(v) for v in vars(m).values())))
+    J = arm.jacobian(angle, m)[rows, :]
+    f = cs.Function("bias", [angle, rate, *free], [cs.jtimes(J @ rate, angle, rate)], {"cse": True})
+    return f(q, dq, *free)

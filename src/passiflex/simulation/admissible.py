@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from passiflex.control.law import ImpedanceLaw
 from passiflex.errors import UnstableLoopError
+from passiflex.simulation.altered import altered
 from passiflex.simulation.linear_loop import LinearLoop, Spectrum
 from passiflex.simulation.problem import Problem
 
@@ -53,44 +54,57 @@ class Admissible(NamedTuple):
     @property
     def sentence(self) -> str:
         """Return the answer in words."""
-        periods = self.delay * self.rate
-        late = "no delay" if periods < 1e-9 else f"{periods:g} period{'s' * (periods != 1)} of delay"
-        words = [f"at {_hertz(self.rate)} with {late}:"]
-        if not math.isnan(self.stiffness_ratio):
+        words = [f"at {hertz(self.rate)} with {delay_words(self.delay * self.rate)}:"]
+        if not math.isnan(self.most_stiffness):
+            low, high = INERTIA_RATIOS[0], STIFFNESS_RATIOS[1]
             words.append(
                 f"K_e ≤ {self.most_stiffness:.3g} K with your B_e;"
-                if self.most_stiffness
-                else "no K_e is stable with your B_e;"
+                if 0 < self.most_stiffness < high
+                else f"{'any' if self.most_stiffness else 'no'} K_e up to {high:g} K is stable with your B_e;"
             )
+            borders = {"your K_e": self.least_inertia, "K_e = K": self.least_inertia_unshaped}
+            if self.stiffness_ratio == 1:
+                del borders["your K_e"]
+            for whose, border in borders.items():
+                words.append(
+                    f"B_e ≥ {border:.3g} B with {whose};"
+                    if low < border < math.inf
+                    else f"no B_e is stable with {whose};"
+                    if border == math.inf
+                    else f"any B_e down to {low:g} B is stable with {whose};"
+                )
+        if not self.spectrum.stable:
             words.append(
-                f"B_e ≥ {self.least_inertia:.3g} B with your K_e;"
-                if math.isfinite(self.least_inertia)
-                else "no B_e is stable with your K_e;"
+                f"your gains are unstable, joint {self.spectrum.joint} grows {self.spectrum.radius:.4g}-fold "
+                f"per period, at {self.spectrum.frequency:.0f} Hz;"
             )
-            words.append(f"B_e ≥ {self.least_inertia_unshaped:.3g} B with K_e = K;")
-        if self.spectrum.stable:
-            words.append("your gains are stable")
+        if self.from_rate < math.inf:
+            words.append(f"your gains are stable from {hertz(self.from_rate)} on")
         else:
-            words.append(
-                f"your gains are unstable: joint {self.spectrum.joint} grows {self.spectrum.radius:.3g}-fold "
-                f"per period, at {self.spectrum.frequency:.0f} Hz"
-            )
-        stable_from = (
-            f"from {_hertz(self.from_rate)} on"
-            if math.isfinite(self.from_rate)
-            else "at no rate up to 200 kHz"
-        )
-        words.append(f"({stable_from})")
-        return " ".join(words)
+            words.append(f"your gains are stable at no rate up to {hertz(RATES[1])}")
+        return " ".join(words) + (" with as many periods of delay" if self.delay > 0 else "")
 
 
 def check(problem: Problem, rate: float | None = None, delay: float | None = None) -> Admissible:
-    """Return whether the problem's gains hold at a rate [Hz] and delay [s], its own unless given."""
-    loop = LinearLoop(problem)
-    period = loop.s.period if rate is None else 1 / rate
-    late = loop.s.delay if delay is None else delay
-    K_ratio, B_ratio = _ratios(problem)
-    shaped = isinstance(problem.law, ImpedanceLaw)
+    """Return whether the problem's gains hold at a rate [Hz] and delay [s], its own unless given.
+
+    The law knows of both: its inner loop predicts over that delay.
+
+    Raises
+    ------
+    ValueRangeError
+        For a problem in continuous time, or a rate or delay that makes no sense.
+    """
+    changed = altered(problem, rate=rate, delay=delay)
+    assert changed.sampling is not None
+    return _judged(LinearLoop(changed), changed.sampling.delay)
+
+
+def _judged(loop: LinearLoop, late: float) -> Admissible:
+    """Return the answer for a loop whose commands are this late [s], whatever its law predicts over."""
+    period = loop.s.period
+    K_ratio, B_ratio = _ratios(loop.problem)
+    shaped = isinstance(loop.problem.law, ImpedanceLaw)
     nan = math.nan
     return Admissible(
         spectrum=loop.spectrum(period, late),
@@ -106,7 +120,7 @@ def check(problem: Problem, rate: float | None = None, delay: float | None = Non
 
 
 def require_stable(problem: Problem) -> None:
-    """Raise unless the linear loop is stable, or the scenario insists.
+    """Raise unless the linear loop is stable, or the scenario insists; its fallback must be stable in any case.
 
     Raises
     ------
@@ -114,13 +128,14 @@ def require_stable(problem: Problem) -> None:
         With the nearest gains that hold.
     """
     assert problem.sampling is not None
-    if problem.sampling.insist:
-        return
     loop = LinearLoop(problem)
     late = {problem.sampling.delay, problem.sampling.delay + problem.sampling.jitter}
-    if all(loop.spectrum(delay=d).stable for d in late):
+    _require_stable_fallback(loop, late)
+    if problem.sampling.insist:
         return
-    found = check(problem, delay=max(late))
+    if all(loop.radius(delay=d) < 1 for d in late):
+        return
+    found = _judged(loop, max(late))
     raise UnstableLoopError(
         f"the law is unstable at the rate and delay of {problem.name!r}",
         got=f"radius {found.spectrum.radius:.4g} per period of {1 / found.rate:g} s, joint {found.spectrum.joint}, "
@@ -130,57 +145,93 @@ def require_stable(problem: Problem) -> None:
     )
 
 
-def least_inertia(loop: LinearLoop, stiffness_ratio: float, period: float, delay: float) -> float:
-    """Return the smallest B_e/B from which on the loop is stable with K_e/K; inf if there is none."""
-    K, B = _own(loop)
-    stiffness: dict[str, Any] = (
-        {} if math.isnan(stiffness_ratio) else {"shaped_stiffness": stiffness_ratio * K}
+def _require_stable_fallback(loop: LinearLoop, late: set[float]) -> None:
+    tank = loop.s.controller.tank
+    if tank is None or not tank.falls_back:
+        return
+    gains = loop.fallback()
+    radius = max(loop.radius(delay=d, gains=gains) for d in late)
+    if radius < 1:
+        return
+    least = max(least_inertia(loop, 1.0, loop.s.period, d) for d in late)
+    raise UnstableLoopError(
+        f"the fallback of {loop.problem.name!r} is unstable at its rate and delay",
+        got=f"radius {radius:.4g} per period of {loop.s.period:g} s",
+        needs="a law that stops the arm at this rate and delay",
+        try_=f"control.fallback.shaped_inertia: {{ratio: {_round_up(1.2 * least):g}}}"
+        if math.isfinite(least)
+        else "a higher rate, less delay, or softer K_x and D_x in control.fallback",
     )
 
-    def stable(ratio: float) -> bool:
-        return loop.spectrum(period, delay, stiffness | {"shaped_inertia": ratio * B}).stable
 
-    return _first_stable(stable, INERTIA_RATIOS)
+def least_inertia(
+    loop: LinearLoop,
+    stiffness_ratio: float,
+    period: float,
+    delay: float,
+    points: int = SCAN,
+    precision: float = PRECISION,
+) -> float:
+    """Return the smallest B_e/B from which on the loop is stable with K_e/K; inf if there is none.
+
+    nan stands for the problem's own K_e; points and precision are those of `first_stable`. The law goes on to
+    predict over the delay that it was built for.
+    """
+
+    def stable(ratio: float) -> bool:
+        return loop.radius(period, delay, shaping(loop, stiffness_ratio, ratio)) < 1
+
+    return first_stable(stable, INERTIA_RATIOS, points, precision)
 
 
 def most_stiffness(loop: LinearLoop, inertia_ratio: float, period: float, delay: float) -> float:
     """Return the largest K_e/K up to which the loop is stable with B_e/B; 0 if there is none."""
-    K, B = _own(loop)
-    inertia: dict[str, Any] = {} if math.isnan(inertia_ratio) else {"shaped_inertia": inertia_ratio * B}
-
-    def stable(inverse: float) -> bool:
-        return loop.spectrum(period, delay, inertia | {"shaped_stiffness": K / inverse}).stable
-
     low, high = STIFFNESS_RATIOS
-    border = _first_stable(stable, (1 / high, 1 / low))
+    border = first_stable(
+        lambda inverse: loop.radius(period, delay, shaping(loop, 1 / inverse, inertia_ratio)) < 1,
+        (1 / high, 1 / low),
+    )
     return 1 / border if math.isfinite(border) else 0.0
 
 
 def stable_from(loop: LinearLoop, periods: float) -> float:
     """Return the rate [Hz] from which on the loop is stable with this many periods of delay; inf if none."""
-    return _first_stable(lambda rate: loop.spectrum(1 / rate, periods / rate).stable, RATES)
+    return first_stable(lambda rate: loop.radius(1 / rate, periods / rate) < 1, RATES)
 
 
-def _first_stable(stable: Callable[[float], bool], limits: tuple[float, float]) -> float:
-    """Return the least value from which all larger ones within the limits are stable; inf if the last one is not."""
-    points = np.geomspace(*limits, SCAN)
-    if not stable(points[-1]):
+def first_stable(
+    stable: Callable[[float], bool],
+    limits: tuple[float, float],
+    points: int = SCAN,
+    precision: float = PRECISION,
+) -> float:
+    """Return the least value from which all larger ones within the limits are stable; inf if the last one is not.
+
+    So many points are tried, evenly in the logarithm; the border is then refined to a relative precision.
+    """
+    tried = np.geomspace(*limits, points)
+    if not stable(tried[-1]):
         return math.inf
-    i = SCAN - 1
-    while i > 0 and stable(points[i - 1]):
+    i = points - 1
+    while i > 0 and stable(tried[i - 1]):
         i -= 1
     if i == 0:
-        return float(points[0])
-    low, high = float(points[i - 1]), float(points[i])
-    while high / low > 1 + PRECISION:
+        return float(tried[0])
+    low, high = float(tried[i - 1]), float(tried[i])
+    while high / low > 1 + precision:
         middle = math.sqrt(low * high)
         low, high = (low, middle) if stable(middle) else (middle, high)
     return high
 
 
-def _own(loop: LinearLoop) -> tuple[Array, Array]:
-    """Return K and B of the law's model."""
-    return loop.model["joint_stiffness"], loop.model["motor_inertia"]
+def shaping(loop: LinearLoop, stiffness_ratio: float, inertia_ratio: float) -> dict[str, Array]:
+    """Return the gains K_e and B_e of these multiples of the model's K and B; nan leaves one as it is."""
+    model = loop.problem.law.robot.layout.unpack(loop.problem.model)
+    gains = {
+        "shaped_stiffness": stiffness_ratio * model["joint_stiffness"],
+        "shaped_inertia": inertia_ratio * model["motor_inertia"],
+    }
+    return {name: value for name, value in gains.items() if not np.isnan(value).any()}
 
 
 def _ratios(problem: Problem) -> tuple[float, float]:
@@ -210,5 +261,12 @@ def _round_up(value: float) -> float:
     return math.ceil(value / step) * step
 
 
-def _hertz(rate: float) -> str:
+def hertz(rate: float) -> str:
+    """Return a rate in words."""
     return f"{rate / 1e3:.3g} kHz" if rate >= 1e3 else f"{rate:.3g} Hz"
+
+
+def delay_words(periods: float) -> str:
+    """Return a delay in words."""
+    periods = round(periods, 9)
+    return f"{periods:g} period{'s' * (periods != 1)} of delay" if periods else "no delay"

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Self
+from collections.abc import Sequence
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from passiflex.simulation.law_settings import Damping, ShapedInertia, ShapedStiffness, Stiffness
-from passiflex.simulation.quantity import Quantity
+from passiflex.simulation.quantity import Quantity, shown
 from passiflex.simulation.section import Mistakes, Section
 
 Vector = tuple[float, ...]
+Found = list[tuple[tuple[str | int, ...], str]]
+"""Mistakes, each with its place."""
 Seconds = Annotated[float, Quantity("s", above=0)]
 Instant = Annotated[float, Quantity("s", least=0)]
 Frequency = Annotated[float, Quantity("Hz", above=0, finite=False)]
@@ -18,8 +21,16 @@ Angle = Annotated[float, Quantity("rad", least=0)]
 Share = Annotated[float, Quantity("1", least=0, most=1)]
 PerJoint = ((), (None,))
 ENDLESS = float("inf")
+NOW = 1e-9
+"""Two instants closer than this are one [s]."""
 MOST_PERIODS = 20
 """Longest delay, in control periods; a loop that is later controls nothing."""
+
+
+def _flag(written: Any) -> bool:
+    if not isinstance(written, bool):
+        raise ValueError(f"expected true or false; got {shown(written)}")
+    return written
 
 
 class Fallback(Section):
@@ -61,7 +72,7 @@ class Control(Section):
     fallback: Fallback = Field(
         default=Fallback(), description="the law that takes over when the tank is overdrawn"
     )
-    insist: bool = Field(
+    insist: Annotated[bool, BeforeValidator(_flag)] = Field(
         default=False, description="run the law even at a rate and delay at which it is unstable"
     )
 
@@ -127,7 +138,9 @@ class Actions(Section):
     follow_acceleration: Share = Field(default=0.0, description="share of Λ ẍ_d that is fed forward, 0 to 1")
 
 
-class _Interval(Section):
+class Interval(Section):
+    """From one instant to another."""
+
     start: Instant = Field(alias="from", description="when it begins, s")
     end: Instant = Field(alias="to", description="when it ends, s")
 
@@ -138,7 +151,7 @@ class _Interval(Section):
         return self
 
 
-class Feedforward(_Interval):
+class Feedforward(Interval):
     """A wrench that the end effector is to exert for some time, as far as the valve is open."""
 
     force: Annotated[Vector, Quantity("N", ((3,),))] = Field(
@@ -149,7 +162,7 @@ class Feedforward(_Interval):
     )
 
 
-class Drag(_Interval):
+class Drag(Interval):
     """The end effector moves through something that takes energy out, as in polishing."""
 
     viscous: Annotated[float, Quantity("N s/m", least=0)] = Field(default=0.0, description="N s/m")
@@ -163,3 +176,27 @@ class GainChange(Section):
     duration: Seconds = Field(description="how long it takes, s")
     stiffness: Stiffness | None = Field(default=None, description="K_x at the end; stays if left out")
     damping: Damping | None = Field(default=None, description="D_x at the end; stays if left out")
+
+
+def change_mistakes(changes: Sequence[GainChange], task: str) -> Found:
+    """Return what of the changes overlaps, or does not fit the task."""
+    found: Found = []
+    for i, change in enumerate(changes):
+        if i and not change.at >= changes[i - 1].at + changes[i - 1].duration - NOW:
+            found.append(((i, "at"), f"the change before lasts longer; got {change.at:g} s"))
+        found += [((i, *place), text) for place, text in gain_mistakes(change, task)]
+    return found
+
+
+def gain_mistakes(given: Fallback | GainChange, task: str) -> Found:
+    """Return what of the gains does not fit the task."""
+    found: Found = []
+    if given.damping is not None and given.damping.ratio is not None:
+        found.append((("damping",), "a damping ratio belongs to one posture; give D_x itself"))
+    for name, part in (("stiffness", given.stiffness), ("damping", given.damping)):
+        try:
+            if part is not None:
+                part.require(task)
+        except Mistakes as mistakes:
+            found += [((name, *place), text) for place, text in mistakes.entries]
+    return found

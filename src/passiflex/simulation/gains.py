@@ -33,10 +33,10 @@ def law_gains(
         "regularisation": np.asarray(s.regularisation),
     }
     if isinstance(s, ImpedanceSettings):
-        gains["shaped_stiffness"] = _sized(
-            "shaped_stiffness", s.shaped_stiffness, model["joint_stiffness"], robot
+        gains["shaped_stiffness"] = sized(
+            "law.shaped_stiffness", s.shaped_stiffness, model["joint_stiffness"], robot
         )
-        gains["shaped_inertia"] = _sized("shaped_inertia", s.shaped_inertia, model["motor_inertia"], robot)
+        gains["shaped_inertia"] = sized("law.shaped_inertia", s.shaped_inertia, model["motor_inertia"], robot)
         gains["damping"] = _damping(s, world, _natural_inertia(law.task.size, start, s.regularisation))
         return gains
     carried = model["motor_inertia"] if s.motor_inertia == "carried" else np.zeros(robot.n)
@@ -67,15 +67,22 @@ def target_inertia(stiffness: Array, damping: Array, ratio: float) -> Array:
     return _symmetric(damping @ np.linalg.solve(stiffness, damping) / (4 * ratio**2))
 
 
-def _sized(
+def sized(
     name: str, setting: ShapedStiffness | ShapedInertia, own: Array, robot: FlexibleJointRobot
 ) -> Array:
+    """Return the values (n,) of a setting.
+
+    Raises
+    ------
+    SizeError
+        If they do not fit the robot's joints.
+    """
     try:
         return setting.resolve(own)
     except ValueError as error:
         raise SizeError(
-            f"law.{name} does not fit robot {robot.name!r}",
-            got=f"{np.size(setting.value or ())} numbers",
+            f"{name} does not fit robot {robot.name!r}",
+            got=f"{np.size(setting.value or setting.ratio or ())} numbers",
             needs=f"one number or {robot.n}",
         ) from error
 

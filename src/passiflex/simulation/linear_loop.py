@@ -3,28 +3,25 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.linalg
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from passiflex.control.rigid import RigidImpedanceLaw
 from passiflex.errors import ValueRangeError
-from passiflex.layout import Layout
 from passiflex.sampled.motors import UNLIMITED_TORQUE
+from passiflex.simulation.altered import replaced
 from passiflex.simulation.compiled import compiled_sampled_loop
+from passiflex.simulation.loop_at_rest import loop_at_rest
 from passiflex.simulation.plant import SURROUNDINGS
-from passiflex.simulation.posture import posture
 from passiflex.simulation.problem import Problem
 
 Array = NDArray[np.float64]
 
 DRIFT = 1e-5
 """An eigenvalue this close to 1 belongs to a self-motion that nothing holds or nothing damps."""
-BRIMFUL = 1e6
-"""Level [J] of a tank that holds nothing back."""
 IDEAL = {
     "link_resolution": 0.0,
     "motor_resolution": 0.0,
@@ -65,13 +62,31 @@ class Spectrum(NamedTuple):
         return self.radius < 1
 
 
+class DrivenLoop(NamedTuple):
+    """z⁺ = A z + G w, τ = C z + D w: the loop with the noise w of the torque sensors, and its command τ.
+
+    Attributes
+    ----------
+    A: (N, N), what `LinearLoop.matrix` returns.
+    G, C, D: (N, n), (n, N), (n, n).
+    """
+
+    A: Array
+    G: Array
+    C: Array
+    D: Array
+
+
 class LinearLoop:
-    """The linear approximation of a sampled problem at its start, for any rate, delay and shaping.
+    """The linear approximation of a sampled problem at its start, for any rate, delay and gains.
 
     The plant is discretised exactly under held commands (matrix exponential). The derivative of the
     period function, sensors and estimators included, is taken by central differences on the compiled
     code, which are exact to 1e-8 here. Left out is what has no linear approximation: resolution, limits,
     Coulomb friction, and a tank that runs empty.
+
+    A delay that is given here is the robot's: the law goes on to predict over the one that it was built
+    for. Where the law is to know of it, make the loop of `altered(problem, delay=…)`.
     """
 
     def __init__(self, problem: Problem):
@@ -84,8 +99,7 @@ class LinearLoop:
         loop = self.compiled.loop
         self.n = problem.law.robot.n
         self.parts = loop.parameters
-        self.numbers = self._replaced(problem.sampling.numbers, IDEAL)
-        self.model = self.parts.model.unpack(problem.model)
+        self.numbers = replaced(self.parts, problem.sampling.numbers, IDEAL)
         self.remembered = np.hstack(
             [
                 np.arange(loop.memory.size)[loop.memory.slices[f.name]]
@@ -96,20 +110,17 @@ class LinearLoop:
         zero = np.zeros(self.n)
         self.x = np.concatenate([problem.q, problem.theta, zero, zero])
         self.A, self.B = self._plant()
+        self._flows: dict[float, tuple[Array, Array]] = {}
 
     def spectrum(
         self,
         period: float | None = None,
         delay: float | None = None,
-        gains: dict[str, Array] | None = None,
+        gains: Mapping[str, ArrayLike] | None = None,
     ) -> Spectrum:
         """Return the dominant mode; period and delay [s] and gains are the problem's own unless given."""
-        matrix = self.matrix(period, delay, gains)
-        values, vectors = np.linalg.eig(matrix)
-        free = 2 * (self.n - min(self.n, self.problem.law.task.size))
-        order = np.argsort(np.abs(values - 1))
-        drifting = [i for i in order[:free] if abs(values[i] - 1) < DRIFT]
-        kept = np.setdiff1d(np.arange(values.size), drifting)
+        values, vectors = np.linalg.eig(self.matrix(period, delay, gains))
+        kept = self._kept(values)
         worst = kept[np.argmax(np.abs(values[kept]))]
         T = self.s.period if period is None else period
         modulus, joints = abs(values[worst]), np.abs(vectors[: 2 * self.n, worst])
@@ -118,29 +129,65 @@ class LinearLoop:
             frequency=abs(float(np.angle(values[worst]))) / (2 * math.pi * T),
             joint=int(np.argmax(joints[: self.n] + joints[self.n :])) + 1,
             decay=-math.log(max(modulus, 1e-300)) / T,
-            drifting=len(drifting),
+            drifting=values.size - kept.size,
         )
+
+    def fallback(self) -> dict[str, Array]:
+        """Return the gains of the law that takes over when the tank is overdrawn."""
+        before = self.parts[: self.parts._fields.index("fallback")]
+        start = sum(part.size for part in before)
+        return self.parts.fallback.unpack(self.s.numbers[start : start + self.parts.fallback.size])
+
+    def radius(
+        self,
+        period: float | None = None,
+        delay: float | None = None,
+        gains: Mapping[str, ArrayLike] | None = None,
+    ) -> float:
+        """Return the spectral radius alone, in half the time."""
+        values = np.linalg.eigvals(self.matrix(period, delay, gains))
+        return float(np.abs(values[self._kept(values)]).max())
 
     def matrix(
         self,
         period: float | None = None,
         delay: float | None = None,
-        gains: dict[str, Array] | None = None,
+        gains: Mapping[str, ArrayLike] | None = None,
     ) -> Array:
         """Return the map of (x, what is remembered, commands on their way) over one period."""
+        return self._period(period, delay, gains, noise=False).A
+
+    def driven(
+        self,
+        period: float | None = None,
+        delay: float | None = None,
+        gains: Mapping[str, ArrayLike] | None = None,
+    ) -> DrivenLoop:
+        """Return the same with the noise of the torque sensors, and the command that it makes."""
+        return self._period(period, delay, gains, noise=True)
+
+    def _period(
+        self,
+        period: float | None,
+        delay: float | None,
+        gains: Mapping[str, ArrayLike] | None,
+        *,
+        noise: bool,
+    ) -> DrivenLoop:
         T = self.s.period if period is None else period
         late = self.s.delay if delay is None else delay
         whole = int(late / T + 1e-9)
         part = max(late / T - whole, 0.0)
-        C = self._control(T, gains)  # (memory, command) by (x, memory)
+        slope = self._control(T, dict(gains or {}), noise)  # (memory, command) by (x, memory, noise)
         n_x, n_c, n = self.x.size, self.remembered.size, self.n
         lined = whole + (part > 1e-9)
         size = n_x + n_c + lined * n
-        command = np.zeros((n, size))
-        command[:, : n_x + n_c] = C[n_c:]
+        told, heard = slice(0, n_x + n_c), slice(size, size + slope.shape[1] - n_x - n_c)
+        command = np.zeros((n, heard.stop))
+        command[:, told], command[:, heard] = slope[n_c:, told], slope[n_c:, n_x + n_c :]
         # The command of this period, then those of the periods before it.
-        sent = [command] + [np.eye(n, size, n_x + n_c + i * n) for i in range(lined)]
-        out = np.zeros((size, size))
+        sent = [command] + [np.eye(n, heard.stop, n_x + n_c + i * n) for i in range(lined)]
+        out = np.zeros((size, heard.stop))
         if part > 1e-9:
             early, gain_early = self._held(part * T)
             rest, gain_rest = self._held((1 - part) * T)
@@ -150,18 +197,27 @@ class LinearLoop:
             step, gain = self._held(T)
             out[:n_x, :n_x] = step
             out[:n_x] += gain @ sent[whole]
-        out[n_x : n_x + n_c, : n_x + n_c] = C[:n_c]
+        remembers = slice(n_x, n_x + n_c)
+        out[remembers, told], out[remembers, heard] = slope[:n_c, told], slope[:n_c, n_x + n_c :]
         for i in range(lined):
             out[n_x + n_c + i * n : n_x + n_c + (i + 1) * n] = sent[i]
-        return out
+        return DrivenLoop(out[:, :size], out[:, size:], command[:, :size], command[:, size:])
+
+    def _kept(self, values: NDArray[Any]) -> NDArray[np.intp]:
+        """Return which eigenvalues are not those of a self-motion's drift."""
+        free = 2 * (self.n - min(self.n, self.problem.law.task.size))
+        near = np.argsort(np.abs(values - 1))[:free]
+        return np.setdiff1d(np.arange(values.size), near[np.abs(values[near] - 1) < DRIFT])
 
     def _held(self, time: float) -> tuple[Array, Array]:
         """Return Φ and Γ of the plant over `time` under a held command."""
-        n_x = self.x.size
-        block = np.zeros((n_x + self.n, n_x + self.n))
-        block[:n_x, :n_x], block[:n_x, n_x:] = self.A, self.B
-        whole = scipy.linalg.expm(block * time)
-        return whole[:n_x, :n_x], whole[:n_x, n_x:]
+        if time not in self._flows:
+            n_x = self.x.size
+            block = np.zeros((n_x + self.n, n_x + self.n))
+            block[:n_x, :n_x], block[:n_x, n_x:] = self.A, self.B
+            whole = scipy.linalg.expm(block * time)
+            self._flows[time] = whole[:n_x, :n_x], whole[:n_x, n_x:]
+        return self._flows[time]
 
     def _plant(self) -> tuple[Array, Array]:
         """Return A and B of the plant at rest."""
@@ -174,78 +230,26 @@ class LinearLoop:
         B = _slope(lambda v: plant.map(self.x, v, numbers)[0], u)[:, : self.n]
         return A, B
 
-    def _control(self, period: float, gains: dict[str, Array] | None) -> Array:
-        """Return the derivative of (memory, command) by (x, memory) of one period at rest."""
-        control = self.compiled.control
-        own = self.parts.gains.unpack(self.problem.gains) | (gains or {})
-        numbers = self._replaced(self._replaced(self.numbers, own, "gains"), {"period": period}, "inner")
-        memory, row = self._at_rest(own, period)
-        n_x = self.x.size
+    def _control(self, period: float, gains: Mapping[str, ArrayLike], noise: bool) -> Array:
+        """Return the derivative of (memory, command) by (x, memory, and noise if wanted) of one period at rest."""
+        control, told = self.compiled.control, self.compiled.loop.row.slices["torque_noise"]
+        own = self.parts.gains.unpack(self.problem.gains) | {k: np.asarray(v) for k, v in gains.items()}
+        numbers = replaced(
+            self.parts, replaced(self.parts, self.numbers, own, "gains"), {"period": period}, "inner"
+        )
+        memory, row = loop_at_rest(self.problem, self.compiled.loop, own, period)
+        n_x, n_c = self.x.size, self.remembered.size
 
         def evaluate(points: Array) -> Array:
             memories = np.tile(memory, (len(points), 1))
-            memories[:, self.remembered] = points[:, n_x:]
-            after, command, _ = control.map(points[:, :n_x], memories, row, numbers)
+            memories[:, self.remembered] = points[:, n_x : n_x + n_c]
+            rows = np.tile(row, (len(points), 1))
+            rows[:, told] += points[:, n_x + n_c :] if noise else 0.0
+            after, command, _ = control.map(points[:, :n_x], memories, rows, numbers)
             return np.hstack([after[:, self.remembered], command])
 
-        return _slope(evaluate, np.concatenate([self.x, memory[self.remembered]]))
-
-    def _at_rest(self, gains: dict[str, Array], period: float) -> tuple[Array, Array]:
-        """Return memory and row of a loop that has been at rest at the start for long, its tank full."""
-        loop, p = self.compiled.loop, self.problem
-        K = self.model["joint_stiffness"]
-        stretch = p.theta - p.q
-        shaped = (
-            p.theta if isinstance(p.law, RigidImpedanceLaw) else p.q + K / gains["shaped_stiffness"] * stretch
-        )
-        home = posture(p.law.robot, shaped, self.model).pose
-        plant = self.parts.plant.unpack(self.s.plant)
-        tau_a = plant["joint_stiffness"] * stretch
-        weight = posture(p.law.robot, p.q, self.model).gravity_torque
-        known: dict[str, Any] = {
-            "started": 1.0,
-            "read_q": p.q,
-            "read_theta": p.theta,
-            "read_tau_a": tau_a,
-            "governed_position": home.position,
-            "governed_rotation": home.rotation,
-            "held_stiffness": gains["stiffness"],
-            "tank_energy": BRIMFUL,
-            "last_q": p.q,
-            "last_tau_a": tau_a,
-            "known_torque": tau_a - weight,
-            "observing": 1.0,
-            "seen": 1.0,
-            "seen_theta": p.theta,
-            "seen_deflection": tau_a / K,
-            "last_command": self.s.held,
-            "given_torque": self.s.held,
-        }
-        row: dict[str, Any] = {
-            "desired_position": home.position,
-            "desired_rotation": home.rotation,
-            "desired_stiffness": gains["stiffness"],
-            "desired_damping": gains["damping"],
-            "elapsed": period,
-        }
-        known |= {f.name: np.tile(self.s.held, (f.shape[0], 1)) for f in loop.memory if f.name == "in_flight"}
-        return _packed(loop.memory, known), _packed(loop.row, row)
-
-    def _replaced(self, numbers: Array, values: dict[str, Any], only: str | None = None) -> Array:
-        """Return the parameters of the period with the named ones replaced, in every part that has them."""
-        out, start = numbers.copy(), 0
-        for name, part in zip(self.parts._fields, self.parts, strict=True):
-            if only in (None, name):
-                for field in part:
-                    if field.name in values:
-                        where = part.slices[field.name]
-                        out[start + where.start : start + where.stop] = np.ravel(values[field.name])
-            start += part.size
-        return out
-
-
-def _packed(layout: Layout, known: dict[str, Any]) -> Array:
-    return layout.pack({f.name: known.get(f.name, np.zeros(f.shape)) for f in layout})
+        unheard = np.zeros(self.n if noise else 0)
+        return _slope(evaluate, np.concatenate([self.x, memory[self.remembered], unheard]))
 
 
 def _slope(f: Callable[[Array], Array], x: Array) -> Array:

@@ -72,10 +72,13 @@ class Rows:
 
     def _gains(self, time: Array) -> tuple[Array, Array]:
         gains = self.problem.law.layout.unpack(self.problem.gains)
+        done = [c for c in self.s.gains if c.end <= time[0]]
+        going = [c for c in self.s.gains if c.end > time[0] and c.start <= time[-1]]
         values = []
         for name in ("stiffness", "damping"):
-            value = np.broadcast_to(gains[name], (time.size, *gains[name].shape)).copy()
-            for change in self.s.gains:
+            begin = getattr(done[-1], name) if done else gains[name]
+            value = np.broadcast_to(begin, (time.size, *begin.shape)).copy()
+            for change in going:
                 s = np.clip((time - change.start) / (change.end - change.start), 0, 1)
                 blend = (s**3 * (10 - 15 * s + 6 * s**2))[:, None, None]
                 target = getattr(change, name)

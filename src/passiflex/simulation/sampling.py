@@ -28,6 +28,7 @@ from passiflex.sampled.sensors import UNFILTERED
 from passiflex.sampled.tank import AbstractTank
 from passiflex.sampled.tanks import PaperTank, PortTank, TimeDomainTank, VariableStiffnessTank
 from passiflex.simulation.control_settings import Actions, Control, MotorSettings, SensorSettings
+from passiflex.simulation.gains import sized
 from passiflex.simulation.law_settings import ImpedanceSettings
 from passiflex.simulation.posture import Posture
 from passiflex.simulation.problem import GainChange, Interval, Sampling
@@ -155,12 +156,11 @@ def _fallback(
         return gains
     wanted = control.fallback
     changed = {
-        "shaped_stiffness": wanted.shaped_stiffness.resolve(model["joint_stiffness"]),
-        "shaped_inertia": wanted.shaped_inertia.resolve(model["motor_inertia"]),
+        name: sized(f"control.fallback.{name}", getattr(wanted, name), model[own], robot)
+        for name, own in (("shaped_stiffness", "joint_stiffness"), ("shaped_inertia", "motor_inertia"))
     }
     for name, matrix in (("stiffness", wanted.stiffness), ("damping", wanted.damping)):
         if matrix is not None:
-            matrix.require(scenario.law.task)
             changed[name] = matrix.full()
     return gains | changed
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal
 
 import yaml
-from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
+from pydantic import BeforeValidator, Field, ValidationInfo, field_validator
 
 from passiflex.simulation.control_settings import (
     Actions,
@@ -13,8 +13,11 @@ from passiflex.simulation.control_settings import (
     Drag,
     Feedforward,
     GainChange,
+    Interval,
     MotorSettings,
     SensorSettings,
+    change_mistakes,
+    gain_mistakes,
 )
 from passiflex.simulation.law_settings import ImpedanceSettings, RigidSettings
 from passiflex.simulation.quantity import Quantity, shown
@@ -87,23 +90,15 @@ class Hold(Section):
 ReferenceEvent = Annotated[Step | Move | Circle | Hold, Field(discriminator="kind")]
 
 
-class Force(Section):
+class Force(Interval):
     """A constant wrench on the end effector for some time; wrenches that overlap add up."""
 
-    start: Instant = Field(alias="from", description="when it begins, s")
-    end: Instant = Field(alias="to", description="when it ends, s")
     force: Annotated[Vector, Quantity("N", ((3,),))] = Field(
         default=ZERO, description="force in world axes, N"
     )
     moment: Annotated[Vector, Quantity("N m", ((3,),))] = Field(
         default=ZERO, description="moment in world axes, N m"
     )
-
-    @model_validator(mode="after")
-    def _ordered(self) -> Self:
-        if not self.end > self.start:
-            raise Mistakes((("to",), f"needs to be later than from = {self.start:g} s; got {self.end:g} s"))
-        return self
 
 
 class ModelErrors(Section):
@@ -197,18 +192,29 @@ class Scenario(Section):
             return None
         if isinstance(info.data.get("law"), RigidSettings):
             raise ValueError("only the impedance law has a tank; remove it, or take law type: impedance")
-        sampled = info.data.get("control") is not None
+        sampled = info.data.get("control", "in error") is not None
         if not sampled and tank.kind not in (None, "paper"):
             raise Mistakes(
                 (("kind",), f"a tank of kind {tank.kind} needs `control`, a rate at which it runs")
+            )
+        if not sampled and tank.only_sampled:
+            raise Mistakes(
+                *(((name,), "needs `control`: only a sampled tank has it") for name in tank.only_sampled)
             )
         return tank.completed("port" if sampled else "paper")
 
     @field_validator("control")
     @classmethod
-    def _inner_loop_of_the_law(cls, control: Control | None, info: ValidationInfo) -> Control | None:
-        if control and control.inner_loop == "matched" and isinstance(info.data.get("law"), RigidSettings):
-            raise Mistakes((("inner_loop",), "the rigid law has no inner loop; take plain"))
+    def _control_of_the_law(cls, control: Control | None, info: ValidationInfo) -> Control | None:
+        if control is None or "law" not in info.data:
+            return control
+        if isinstance(info.data["law"], RigidSettings):
+            if control.inner_loop == "matched":
+                raise Mistakes((("inner_loop",), "the rigid law has no inner loop; take plain"))
+            return control
+        found = gain_mistakes(control.fallback, info.data["law"].task)
+        if found:
+            raise Mistakes(*((("fallback", *place), text) for place, text in found))
         return control
 
     @field_validator(*WITH_CONTROL)
@@ -223,15 +229,7 @@ class Scenario(Section):
     def _gains_of_the_task(
         cls, changes: tuple[GainChange, ...], info: ValidationInfo
     ) -> tuple[GainChange, ...]:
-        found: list[tuple[tuple[str | int, ...], str]] = []
-        for i, change in enumerate(changes):
-            if i and not change.at >= changes[i - 1].at + changes[i - 1].duration:
-                found.append(((i, "at"), f"the change before lasts longer; got {change.at:g} s"))
-            if change.damping is not None and change.damping.ratio is not None:
-                found.append(((i, "damping"), "a damping ratio belongs to one posture; give D_x itself"))
-            for part in (change.stiffness, change.damping):
-                if part is not None and "law" in info.data:
-                    part.require(info.data["law"].task)
+        found = change_mistakes(changes, info.data["law"].task) if "law" in info.data else []
         if found:
             raise Mistakes(*found)
         return changes
@@ -267,17 +265,16 @@ class Scenario(Section):
             raise Mistakes(*found)
         return events
 
-    @field_validator("forces")
+    @field_validator("forces", "gains", "feedforward", "drags")
     @classmethod
-    def _within_the_run(cls, forces: tuple[Force, ...], info: ValidationInfo) -> tuple[Force, ...]:
+    def _within_the_run(cls, entries: tuple[Any, ...], info: ValidationInfo) -> tuple[Any, ...]:
         end = info.data.get("duration", float("inf"))
+        begin = [("at", e.at) if isinstance(e, GainChange) else ("from", e.start) for e in entries]
         needs = f"needs to be earlier than the end, {end:g} s"
-        late = [
-            ((i, "from"), f"{needs}; got {f.start:g} s") for i, f in enumerate(forces) if not f.start < end
-        ]
+        late = [((i, name), f"{needs}; got {t:g} s") for i, (name, t) in enumerate(begin) if not t < end]
         if late:
             raise Mistakes(*late)
-        return forces
+        return entries
 
     @field_validator("output_interval")
     @classmethod

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -11,8 +11,8 @@ from passiflex.simulation.section import Mistakes, Section
 
 Energy = Annotated[float, Quantity("J", least=0)]
 
-PAPER_DEFAULTS = {"accounting": "paper"}
-PORT_DEFAULTS = {"accounting": "signed", "floor": 0.1, "low": 0.2}
+PAPER_DEFAULTS: dict[str, Any] = {"accounting": "paper"}
+PORT_DEFAULTS: dict[str, Any] = {"accounting": "signed", "floor": 0.1, "low": 0.2}
 """What goes with a kind of tank. The port tank measures: its floor stands above the error of that."""
 
 
@@ -61,23 +61,35 @@ class TankSettings(Section):
         if not self.initial > self.floor:
             what = f"a tank started empty never moves the reference; got {self.initial:g} J"
             found.append((("initial",), f"{what}; needs more than the floor of {self.floor:g} J"))
-        if not self.low > self.floor:
-            found.append((("low",), f"needs more than the floor of {self.floor:g} J; got {self.low:g} J"))
+        floor, low = self._likely("floor"), self._likely("low")
+        if not low > self.floor:
+            found.append((("low",), f"needs more than the floor of {self.floor:g} J; got {low:g} J"))
         if not self.cap - self.band > self.low:
             found.append(
                 (("cap",), f"needs more than low + band, {self.low + self.band:g} J; got {self.cap:g} J")
             )
-        if self.trip is not None and not self.trip < self.floor:
-            found.append((("trip",), f"needs less than the floor of {self.floor:g} J; got {self.trip:g} J"))
+        if self.trip is not None and not self.trip < floor:
+            found.append((("trip",), f"needs less than the floor of {floor:g} J; got {self.trip:g} J"))
         if found:
             raise Mistakes(*found)
         return self
+
+    def _likely(self, name: Literal["floor", "low"]) -> float:
+        """Return a level as it will be: the port tank's own if it is left out, and the tank may still become one."""
+        left_out = name not in self.model_fields_set and self.kind in (None, "port")
+        return PORT_DEFAULTS[name] if left_out else getattr(self, name)
 
     def completed(self, kind: Literal["paper", "port"]) -> Self:
         """Return the settings with `kind` and the accounting that goes with it, where they were left out."""
         given = self.model_dump(exclude_unset=True, exclude_none=True)
         defaults = PORT_DEFAULTS if given.get("kind", kind) == "port" else PAPER_DEFAULTS
         return type(self).model_validate({"kind": kind} | defaults | given)
+
+    @property
+    def only_sampled(self) -> tuple[str, ...]:
+        """Return the names of the entries that are not at their defaults, and that only a sampled tank has."""
+        names = ("power", "trip", "braking")
+        return tuple(n for n in names if getattr(self, n) != type(self).model_fields[n].default)
 
     @property
     def signed(self) -> bool:

@@ -1,0 +1,23 @@
+"""Whether gains hold at a rate and a delay, and which would."""
+
+from __future__ import annotations
+
+from passiflex.limits.subject import Subject, sampled_problem
+from passiflex.simulation.admissible import Admissible
+from passiflex.simulation.admissible import check as check_problem
+
+
+def check(subject: Subject, rate: float | str | None = None, delay: float | str | None = None) -> Admissible:
+    """Return whether the gains of a scenario, its file or a problem are stable, and the nearest that are.
+
+    Parameters
+    ----------
+    rate, delay: [Hz], [s], its own unless given; text may name a unit, as "1 kHz". A scenario in continuous
+        time needs a rate.
+
+    Raises
+    ------
+    PassiflexError
+        If there is no rate, rate or delay make no sense, or the scenario does not fit its robot.
+    """
+    return check_problem(sampled_problem(subject, rate, delay))

@@ -1,0 +1,74 @@
+"""A sampled loop that has been at rest at its start for long: what its controller remembers and is told."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from passiflex.control.rigid import RigidImpedanceLaw
+from passiflex.layout import Layout
+from passiflex.simulation.posture import posture
+from passiflex.simulation.problem import Problem
+from passiflex.simulation.sampled_loop import SampledLoop
+
+Array = NDArray[np.float64]
+
+BRIMFUL = 1e6
+"""Level [J] of a tank that holds nothing back."""
+
+
+class AtRest(NamedTuple):
+    """Memory and row of a period at rest, flat: `SampledLoop.memory` and `SampledLoop.row`."""
+
+    memory: Array
+    row: Array
+
+
+def loop_at_rest(problem: Problem, loop: SampledLoop, gains: Mapping[str, Array], period: float) -> AtRest:
+    """Return what a period finds and leaves unchanged, with the gains in place of the problem's and a full tank."""
+    p, s = problem, problem.sampling
+    assert s is not None
+    model, plant = loop.parameters.model.unpack(p.model), loop.parameters.plant.unpack(s.plant)
+    K = model["joint_stiffness"]
+    stretch = p.theta - p.q
+    shaped = (
+        p.theta if isinstance(p.law, RigidImpedanceLaw) else p.q + K / gains["shaped_stiffness"] * stretch
+    )
+    home = posture(p.law.robot, shaped, model).pose
+    tau_a = plant["joint_stiffness"] * stretch
+    weight = posture(p.law.robot, p.q, model).gravity_torque
+    known: dict[str, Any] = {
+        "started": 1.0,
+        "read_q": p.q,
+        "read_theta": p.theta,
+        "read_tau_a": tau_a,
+        "governed_position": home.position,
+        "governed_rotation": home.rotation,
+        "held_stiffness": gains["stiffness"],
+        "tank_energy": BRIMFUL,
+        "last_q": p.q,
+        "last_tau_a": tau_a,
+        "known_torque": tau_a - weight,
+        "observing": 1.0,
+        "seen": 1.0,
+        "seen_theta": p.theta,
+        "seen_deflection": tau_a / K,
+        "last_command": s.held,
+        "given_torque": s.held,
+    }
+    row: dict[str, Any] = {
+        "desired_position": home.position,
+        "desired_rotation": home.rotation,
+        "desired_stiffness": gains["stiffness"],
+        "desired_damping": gains["damping"],
+        "elapsed": period,
+    }
+    known |= {f.name: np.tile(s.held, (f.shape[0], 1)) for f in loop.memory if f.name == "in_flight"}
+    return AtRest(_packed(loop.memory, known), _packed(loop.row, row))
+
+
+def _packed(layout: Layout, known: Mapping[str, Any]) -> Array:
+    return layout.pack({f.name: known.get(f.name, np.zeros(f.shape)) for f in layout})

@@ -1,0 +1,132 @@
+"""`passiflex limits`: the sentence, tables and files; exit status 0 for stable, 1 for unstable, 2 for mistakes."""
+
+from __future__ import annotations
+
+import re
+import sys
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+import yaml
+
+from passiflex.cli import main
+from passiflex.limits import check
+from passiflex.simulation import load_scenario
+from worlds import PLAIN, merged
+
+
+class Result(NamedTuple):
+    """What a call of the command line left behind."""
+
+    status: int
+    out: str
+    err: str
+
+
+def limits(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, *arguments: object) -> Result:
+    monkeypatch.setattr(sys, "argv", ["passiflex", "limits", *map(str, arguments)])
+    capsys.readouterr()
+    with pytest.raises(SystemExit) as end:
+        main()
+    captured = capsys.readouterr()
+    assert "Traceback" not in captured.out + captured.err
+    return Result(int(end.value.code or 0), captured.out, captured.err)
+
+
+@pytest.fixture
+def scenario(tmp_path: Path) -> Path:
+    path = tmp_path / "planar.yaml"
+    path.write_text(PLAIN.replace("rate: 1000", "rate: 1000, delay: 0.001"))
+    return path
+
+
+def test_stable_gains_end_with_0_and_the_answer(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, scenario: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "new"
+    result = limits(capsys, monkeypatch, scenario, "--out", out)
+    assert (result.status, result.err) == (0, "")
+    lines = result.out.splitlines()
+    answer = check(scenario)
+    assert answer.sentence in lines
+    (one,) = (line for line in lines if re.match(r"│ 1 +│", line))
+    cells = [float(cell) for cell in one.strip("│").split("│")]
+    assert cells[2] == pytest.approx(answer.least_inertia, rel=0.02)
+    assert cells[1] < cells[2] < cells[3]
+    assert re.search(r"│ these gains +│ 0\.\d+ +│ stable +│ settles", result.out)
+    assert re.search(r"│ K_e = 1 K, B_e = \S+ B +│ 1\.\d+ +│ unstable +│ grows", result.out)
+    assert "differs" not in result.out
+    assert [f"wrote {out / name}" for name in ("limits.png", "limits.pdf")] == lines[-3:-1]
+    assert sorted(p.name for p in out.iterdir()) == ["limits.pdf", "limits.png"]
+    assert re.fullmatch(r"took \d+\.\d s", lines[-1])
+
+
+def test_unstable_gains_end_with_1(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, scenario: Path
+) -> None:
+    result = limits(capsys, monkeypatch, scenario, "--rate", "0.25 kHz", "--delay", "8 ms")
+    assert result.status == 1
+    assert "at 250 Hz with 2 periods of delay:" in result.out
+    assert "your gains are unstable, joint" in result.out
+    assert re.search(r"│ these gains +│ 1\.\d+ +│ unstable +│ grows", result.out)
+
+
+def test_a_recommendation_can_be_pasted(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, scenario: Path, tmp_path: Path
+) -> None:
+    result = limits(capsys, monkeypatch, scenario, "--recommend")
+    (sentence,) = (line for line in result.out.splitlines() if line.startswith("recommended: "))
+    assert "hold at 7 postures with B, K, D and the links' inertia off by 20 %" in sentence
+    snippet = yaml.safe_load(result.out[result.out.index("law:\n") : result.out.index("\ntook")])
+    old = yaml.safe_load(scenario.read_text())
+    snippet["law"]["shaped_inertia"]["ratio"] = None  # of the scenario that it replaces
+    pasted = tmp_path / "pasted.yaml"
+    pasted.write_text(yaml.safe_dump(merged(old, snippet)))
+    assert check(load_scenario(pasted)).spectrum.stable
+
+
+def test_a_scenario_in_continuous_time_needs_a_rate(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    path = tmp_path / "continuous.yaml"
+    data = merged(yaml.safe_load(PLAIN), {"control": None, "tank": None})
+    path.write_text(yaml.safe_dump(data))
+    result = limits(capsys, monkeypatch, path)
+    assert result.status == 2
+    assert result.err == (
+        "passiflex: scenario 'planar' has no control rate; needs `control: {rate: …}`, or a rate beside it; "
+        "try --rate '1 kHz', or rate=1000\n"
+    )
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--rate", "fast"], "passiflex: rate; got 'fast'; needs Hz, one number, > 0"),
+        (["--rate", "0"], "passiflex: rate; got '0'"),
+        (["--delay", "1 m"], "passiflex: delay; got '1 m'"),
+        (["--delay", "1 s"], "passiflex: delay of a command; got 1 s; needs 0 to 61 periods"),
+    ],
+)
+def test_what_makes_no_sense_ends_with_2_and_one_line(
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    scenario: Path,
+    arguments: list[str],
+    message: str,
+) -> None:
+    result = limits(capsys, monkeypatch, scenario, *arguments)
+    assert result.status == 2
+    assert result.err.startswith(message)
+    assert len(result.err.splitlines()) == 1
+
+
+def test_a_folder_that_cannot_be_written_is_told_before_the_work(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, scenario: Path, tmp_path: Path
+) -> None:
+    (tmp_path / "taken").write_text("a file")
+    result = limits(capsys, monkeypatch, scenario, "--out", tmp_path / "taken" / "new")
+    assert result.status == 2
+    assert result.out == ""
+    assert result.err.startswith("passiflex: cannot write into")
