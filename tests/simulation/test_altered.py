@@ -137,7 +137,7 @@ def test_at_rate_says_what_altered_does() -> None:
         (
             {"delay": -1e-3},
             ValueRangeError,
-            "delay of a command; got -0.001 s; needs 0 to 61 periods, 0.061 s",
+            "delay of a command; got -0.001 s; needs 0 to 20 periods, 0.02 s",
         ),
         ({"delay": 0.1}, ValueRangeError, "delay of a command; got 0.1 s"),
         ({"gains": {"stifness": 1.0}}, NameUnknownError, "unknown gain; got 'stifness'.*try 'stiffness'"),

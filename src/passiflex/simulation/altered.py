@@ -13,9 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from passiflex.control.rigid import RigidImpedanceLaw
 from passiflex.errors import NameUnknownError, ValueRangeError
-from passiflex.native.held_loop import LONGEST_LINE
 from passiflex.sampled.controller import SampledController
 from passiflex.sampled.matched_loop import MatchedInnerLoop
+from passiflex.simulation.control_settings import MOST_PERIODS
 from passiflex.simulation.motion import Motion, Pose, pose_at, shifted
 from passiflex.simulation.posture import posture
 from passiflex.simulation.problem import Problem, Sampling
@@ -27,8 +27,6 @@ Array = NDArray[np.float64]
 
 HIGHEST_RATE = 1e6
 """[Hz], as in a scenario."""
-MOST_PERIODS = LONGEST_LINE - 3
-"""Longest delay, in periods."""
 MATRICES = ("stiffness", "damping", "target_inertia")
 GAINS = (*MATRICES, "shaped_stiffness", "shaped_inertia", "null_space_damping", "regularisation")
 """Gains that a scenario can write as numbers, and that can therefore be altered."""
