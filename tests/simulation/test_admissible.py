@@ -213,3 +213,16 @@ def test_a_scenario_of_the_rigid_law_has_a_rate_only() -> None:
         pytest.xfail("the rigid law cannot be sampled yet: J̇ q̇ needs q to be a symbol")
     assert math.isnan(found.least_inertia)
     assert found.spectrum.stable
+
+
+def test_an_unstable_fallback_is_refused_before_it_is_needed() -> None:
+    """The law itself holds; what would stop the arm does not."""
+    fallback = {"shaped_stiffness": {"ratio": 1}, "shaped_inertia": {"ratio": 0.01}}
+    control = {"rate": 1000, "delay": 0.001, "external_torque": "none", "fallback": fallback}
+    problem = resolve(world(control=control))
+    with pytest.raises(
+        UnstableLoopError, match=r"the fallback of .* is unstable .*fallback.shaped_inertia: \{ratio: "
+    ):
+        require_stable(problem)
+    insisting = resolve(world(control=control | {"insist": True}))
+    require_stable(insisting)

@@ -120,7 +120,7 @@ def _judged(loop: LinearLoop, late: float) -> Admissible:
 
 
 def require_stable(problem: Problem) -> None:
-    """Raise unless the linear loop is stable, or the scenario insists; its fallback must be stable in any case.
+    """Raise unless the linear loop and its fallback are stable, or the scenario insists.
 
     Raises
     ------
@@ -128,11 +128,11 @@ def require_stable(problem: Problem) -> None:
         With the nearest gains that hold.
     """
     assert problem.sampling is not None
+    if problem.sampling.insist:
+        return
     loop = LinearLoop(problem)
     late = {problem.sampling.delay, problem.sampling.delay + problem.sampling.jitter}
     _require_stable_fallback(loop, late)
-    if problem.sampling.insist:
-        return
     if all(loop.radius(delay=d) < 1 for d in late):
         return
     found = _judged(loop, max(late))
