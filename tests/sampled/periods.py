@@ -28,7 +28,13 @@ FULL = 1e6
 """A level [J] that pays for anything, and opens the valve."""
 LEVELS = {"floor": 0.1, "low": 0.3, "cap": 1e7, "power": 1e9 / PERIOD, "trip": -1e30, "signed": 1.0}
 LEVELS |= {"fill": 1.0, "braking": 100.0}
-OFF = {"follow_velocity": 0.0, "follow_acceleration": 0.0, "posture_stiffness": 0.0, "posture": 0.3}
+OFF = {
+    "follow_velocity": 0.0,
+    "follow_acceleration": 0.0,
+    "posture_stiffness": 0.0,
+    "posture_damping": 0.0,
+    "posture": 0.3,
+}
 LEDGER = Layout(
     tuple(Field(name, (), "J") for name in TankEntry._fields)
     + tuple(Field(name, (), "") for name in LedgerEntry._fields[1:])
@@ -87,11 +93,12 @@ class Rig:
         p = cs.SX.sym("p", sum(part.size for part in self.controller.parameters))
         views, rows = _split(self.controller.parameters, p), slice(0, law.task.size)
         m, g, a, y = views.m, views.g, views.actions, _said(t)[0]
-        phi = law.stored(y, m, g).phi
+        stored = law.stored(y, m, g)
+        phi, dphi = stored.phi, stored.dphi
         M, J = law.robot.arm.mass_matrix(y.q, m), law.robot.arm.jacobian(y.q, m)[rows, :]
         at_end = law.robot.arm.jacobian(phi, m)
         lead = tracking_wrench(M, J, t.damping, t.velocity[rows], t.acceleration[rows], g.regularisation, a)
-        pull = posture_spring(M, J, phi, a.posture_stiffness, a.posture, g.regularisation)
+        pull = posture_spring(M, J, phi, dphi, g.regularisation, a)
         torque = at_end.T @ t.wrench + at_end[rows, :].T @ lead + pull
         return cs.Function("actions", [told, p], [cs.densify(torque)], {"cse": True})
 

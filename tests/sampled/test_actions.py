@@ -32,12 +32,11 @@ def terms(arm: SerialArm) -> cs.Function:
 @lru_cache
 def spring_function(n: int, k: int) -> cs.Function:
     M, J = cs.SX.sym("M", n, n), cs.SX.sym("J", k, n)
-    phi, stiffness, posture, eps = (
-        cs.SX.sym(name, size) for name, size in {"f": n, "K": n, "p": n, "e": 1}.items()
-    )
-    return cs.Function(
-        "posture", [M, J, phi, stiffness, posture, eps], [posture_spring(M, J, phi, stiffness, posture, eps)]
-    )
+    phi, stiffness, posture, dphi, damping = (cs.SX.sym(name, n) for name in ("f", "K", "p", "v", "D"))
+    eps = cs.SX.sym("e")
+    a = SimpleNamespace(posture_stiffness=stiffness, posture_damping=damping, posture=posture)
+    arguments = [M, J, phi, stiffness, posture, eps, dphi, damping]
+    return cs.Function("posture", arguments, [posture_spring(M, J, phi, dphi, eps, a)])
 
 
 @lru_cache
@@ -49,7 +48,14 @@ def wrench_function(n: int, k: int) -> cs.Function:
 
 
 def spring(M: np.ndarray, J: np.ndarray, *numbers: np.ndarray | float) -> np.ndarray:
-    return np.array(spring_function(len(M), len(J))(M, J, *numbers)).ravel()
+    still = (np.zeros(len(M)),) * (6 - len(numbers))  # at rest and undamped unless given
+    return np.array(spring_function(len(M), len(J))(M, J, *numbers, *still)).ravel()
+
+
+def hidden(M: np.ndarray, J: np.ndarray, motion: np.ndarray, eps: float = 0.0) -> np.ndarray:
+    """Return Nᵀ x = x − M⁻¹ Jᵀ Λ J x."""
+    mobility = J @ np.linalg.solve(M, J.T) + eps * np.eye(len(J))
+    return motion - np.linalg.solve(M, J.T @ np.linalg.solve(mobility, J @ motion))
 
 
 def follow(M: np.ndarray, J: np.ndarray, *numbers: np.ndarray | float) -> np.ndarray:
@@ -75,14 +81,15 @@ def test_the_end_effector_does_not_feel_the_posture_spring(n: int, k: int, seed:
     J_bar = np.linalg.inv(M) @ J.T @ np.linalg.inv(J @ np.linalg.inv(M) @ J.T)
     np.testing.assert_allclose(J_bar.T @ tau, 0, atol=1e-9)
     np.testing.assert_allclose(J @ np.linalg.solve(M, tau), 0, atol=1e-9)
-    np.testing.assert_allclose(tau, (np.eye(n) - J.T @ J_bar.T) @ (stiffness * (posture - phi)), atol=1e-9)
+    N = np.eye(n) - J.T @ J_bar.T
+    np.testing.assert_allclose(tau, N @ (stiffness * (N.T @ (posture - phi))), atol=1e-9)
 
 
 @each_size
 @settings(max_examples=20, deadline=None)
 @given(seed=SEEDS)
 def test_the_posture_spring_pulls_toward_the_posture(n: int, k: int, seed: int) -> None:
-    """Along a self-motion, J v = 0, its power is that of the whole spring: −d/dt ½ (φ_n − φ)ᵀ K_n (φ_n − φ).
+    """Along a self-motion, J v = 0, its power is that of K_n at the hidden part Nᵀ (φ_n − φ) of the distance.
 
     And what it accelerates, M⁻¹ τ, is such a motion, toward the posture: τᵀ M⁻¹ τ > 0.
     """
@@ -90,10 +97,11 @@ def test_the_posture_spring_pulls_toward_the_posture(n: int, k: int, seed: int) 
     M, J = matrices(n, k, rng)
     stiffness, phi, posture = rng.uniform(1, 100, n), *rng.uniform(-1, 1, (2, n))
     tau = spring(M, J, phi, stiffness, posture, 0.0)
+    pull = stiffness * hidden(M, J, posture - phi)
     for v in np.linalg.svd(J)[2][k:]:
-        assert tau @ v == pytest.approx(stiffness * (posture - phi) @ v, rel=0, abs=1e-9)
+        assert tau @ v == pytest.approx(pull @ v, rel=0, abs=1e-9)
     v = np.linalg.solve(M, tau)
-    approach = stiffness * (posture - phi) @ v
+    approach = pull @ v
     assert approach == pytest.approx(tau @ v, rel=1e-9, abs=1e-9)
     assert approach > 0
 
@@ -115,13 +123,32 @@ def test_no_stiffness_and_no_distance_are_no_torque(n: int, k: int, seed: int) -
 def test_with_regularisation_the_end_effector_feels_its_share(
     n: int, k: int, seed: int, exponent: float
 ) -> None:
-    """J M⁻¹ τ = ε Λ_ε J M⁻¹ K_n (φ_n − φ), exactly: all of the spring for a large ε, nothing for a small one."""
+    """J M⁻¹ τ = ε Λ_ε J M⁻¹ K_n Nᵀ (φ_n − φ), exactly: all of the spring for a large ε, nothing for a small one."""
     rng, eps = np.random.default_rng(seed), 10**exponent
     M, J = matrices(n, k, rng)
     stiffness, phi, posture = rng.uniform(0, 100, n), *rng.uniform(-1, 1, (2, n))
     felt = J @ np.linalg.inv(M)
-    leak = eps * np.linalg.solve(felt @ J.T + eps * np.eye(k), felt @ (stiffness * (posture - phi)))
+    leak = eps * np.linalg.solve(
+        felt @ J.T + eps * np.eye(k), felt @ (stiffness * hidden(M, J, posture - phi, eps))
+    )
     np.testing.assert_allclose(felt @ spring(M, J, phi, stiffness, posture, eps), leak, rtol=0, atol=1e-9)
+
+
+@each_size
+@settings(max_examples=20, deadline=None)
+@given(seed=SEEDS)
+def test_the_springs_stiffness_and_damping_are_symmetric_and_never_negative(
+    n: int, k: int, seed: int
+) -> None:
+    """−∂τ/∂φ at N held, and −∂τ/∂φ̇: N K_n Nᵀ and N D_n Nᵀ. N K_n alone would not be, and flutters."""
+    rng = np.random.default_rng(seed)
+    M, J = matrices(n, k, rng)
+    gains, zero = rng.uniform(1, 100, n), np.zeros(n)
+    stiffness = np.array([spring(M, J, zero, gains, e, 0.0) for e in np.eye(n)]).T
+    damping = -np.array([spring(M, J, zero, zero, zero, 0.0, e, gains) for e in np.eye(n)]).T
+    np.testing.assert_allclose(damping, stiffness, atol=1e-9)
+    np.testing.assert_allclose(stiffness, stiffness.T, atol=1e-9 * np.abs(stiffness).max())
+    assert np.linalg.eigvalsh(stiffness).min() >= -1e-9 * np.abs(stiffness).max()
 
 
 def test_an_arm_without_a_null_space_has_no_posture_spring() -> None:
@@ -143,7 +170,7 @@ def test_the_posture_spring_of_an_arm_moves_its_elbow_alone(robot: FlexibleJoint
     tau = spring(M, J, phi, np.full(arm.n, 50.0), posture, 0.0)
     ddq = np.linalg.solve(M, tau)
     np.testing.assert_allclose(J @ ddq, 0, atol=1e-9 * np.abs(ddq).max())
-    assert (posture - phi) @ ddq > 0
+    assert 50.0 * hidden(M, J, posture - phi) @ ddq > 0
 
 
 @pytest.mark.parametrize("eps", [0.0, 1e-2])
@@ -207,6 +234,7 @@ def test_with_the_tracking_wrench_the_end_effector_does_not_lag(seed: int) -> No
 def test_the_layout_has_a_switch_for_each_action() -> None:
     assert {f.name: f.size for f in action_layout(5)} == {
         "posture_stiffness": 5,
+        "posture_damping": 5,
         "posture": 5,
         "follow_velocity": 1,
         "follow_acceleration": 1,

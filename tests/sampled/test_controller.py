@@ -14,7 +14,13 @@ from sampled.periods import FULL, LEVELS, PERIOD, Rig, planar_rig, spatial_rig
 
 OBSERVER, VARIABLE = TimeDomainTank(), VariableStiffnessTank()
 RIGS = {"position": planar_rig, "pose": spatial_rig}
-ON = {"follow_velocity": 0.7, "follow_acceleration": 0.9, "posture_stiffness": 40.0, "posture": 0.3}
+ON = {
+    "follow_velocity": 0.7,
+    "follow_acceleration": 0.9,
+    "posture_stiffness": 40.0,
+    "posture_damping": 3.0,
+    "posture": 0.3,
+}
 STILL = {"velocity": np.zeros(6), "acceleration": np.zeros(6), "wrench": np.zeros(6)}
 WRENCH = np.array([5.0, -3.0, 8.0, 0.4, 0.1, -0.2])
 ACTIONS = {

@@ -15,7 +15,7 @@ from passiflex.sampled.tanks import PortTank
 from sampled.periods import FULL, LEVELS, PERIOD, Rig, planar_rig, spatial_rig
 
 LONG, TRIP = 1000, 0.05
-ON = {"follow_velocity": 0.7, "follow_acceleration": 0.9, "posture_stiffness": 40.0}
+ON = {"follow_velocity": 0.7, "follow_acceleration": 0.9, "posture_stiffness": 40.0, "posture_damping": 3.0}
 RIGS = {"position": planar_rig, "pose": spatial_rig}
 PORT, OBSERVED = PortTank(), MomentumObserver()
 BAD = (np.nan, np.inf, -np.inf, 1e200)

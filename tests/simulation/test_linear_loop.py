@@ -158,7 +158,7 @@ def test_central_differences_agree_with_exact_derivatives(inner: str) -> None:
     loop = LinearLoop(p)
     gains = p.law.layout.unpack(p.gains)
     symbolic = loop.compiled.loop.control
-    memory, row = loop_at_rest(p, loop.compiled.loop, gains, PERIOD)
+    memory, row, _ = loop_at_rest(p, loop.compiled.loop, gains, PERIOD)
     x, c, w, number = (cs.SX.sym(f"v{i}", symbolic.size1_in(i)) for i in range(4))
     after, command, _ = symbolic(x, c, w, number)
     told = loop.compiled.loop.row.slices["torque_noise"]

@@ -152,7 +152,13 @@ def test_the_stored_configuration_gives_the_same_run_again(tmp_path: Path, chang
 def test_the_stored_configuration_is_complete() -> None:
     """Defaults are written out, and everything is in SI units."""
     configuration = yaml.safe_load(planar_run().data.attrs["configuration"])
-    assert set(configuration) == set(Scenario.model_fields) - {"noise", "control", "sensors", "motors", "actions"}
+    assert set(configuration) == set(Scenario.model_fields) - {
+        "noise",
+        "control",
+        "sensors",
+        "motors",
+        "actions",
+    }
     assert configuration["tank"]["initial"] == 2.0
     assert configuration["law"]["regularisation"] == 1e-9
     assert configuration["tolerance"] == 1e-9

@@ -92,7 +92,7 @@ def audit(run: Run) -> Audit:
         term=_deciding_term(run, law, decided),
         margin=float(margin.min()),
         integration_error=links.worst,
-        books_error=max(0.0, float(overclaimed(run).max())) if run.sampled else law.worst,
+        books_error=float(np.maximum(overclaimed(run), 0.0).max()) if run.sampled else law.worst,
         ledger_residual=robot.worst,
         remedy=remedy,
         balances=(robot, links, law),

@@ -264,7 +264,7 @@ class SampledController:
             M, J, damping, wish.velocity[rows], wish.acceleration[rows], regularisation, a
         )
         at_end = arm.jacobian(now.phi, p.m)
-        posture = posture_spring(M, J, now.phi, a.posture_stiffness, a.posture, regularisation)
+        posture = posture_spring(M, J, now.phi, now.dphi, regularisation, a)
         return at_end.T @ wish.wrench + at_end[rows, :].T @ follow + posture
 
 

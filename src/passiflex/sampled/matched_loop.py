@@ -1,6 +1,6 @@
 """An inner loop for slow clocks: the held torque takes the motor to where the shaped one would be.
 
-The paper's (5) at a sample, held for a period and late by another, reduces the motor inertia to about 0.15 B
+The paper's (5) at a sample, held for a period and late by another, reduces the motor inertia to about 0.11 B
 at 1 kHz before it is unstable. Here the state is predicted over the delay, the shaped motor makes one
 implicit step from there, and the command is the held torque that ends at the same velocity. For the
 fast part, link and motor inertia need not be known to each other: what the link does is taken from τ_a and
@@ -146,7 +146,7 @@ class MatchedInnerLoop(AbstractInnerLoop):
         R = cs.diag(share)
         impulse = T / B_s / (1 + T * D / B_s + T**2 * K / B_s)
         # One backward-Euler step of the shaped motor on the real spring, its damping implicit.
-        drive = v_end / impulse + B_s / T * slip + force - K * delta - B_s * a
+        drive = v_end / impulse + B_s / T * slip + force - K * delta - g.shaped_inertia * a
         drive -= outer.damping @ ((1 - share) * v_end)
         w_end = solve_spd(cs.diag(share / impulse) + R @ outer.damping @ R, share * drive)
         tau_m = K * delta + B * a + B / flow.push * (w_end - v_end - flow.keep * slip)

@@ -17,8 +17,9 @@ UNLIMITED = 1e9
 class PortTank(AbstractTank):
     """T_k+1 = T_k − (S_k+1 − S_k) − w_k (theory note 4): exact, whatever happened in between.
 
-    With it T + S + Σw is constant, so Σw ≤ S₀ + T₀ as long as T ≥ 0: passivity at the joints, for any
-    controller inside, from measured τ_a, q and the storage alone.
+    With it T + S + Σw is constant, so Σw ≤ S₀ + T₀ − S as long as T ≥ 0: passivity at the joints, for any
+    controller inside, from measured τ_a, q and the storage alone. S ≥ 0 if the law carries no weight; if it
+    does, S + V̂(q) ≥ 0 with the weight V̂ of its model, and Σw − (V̂ − V̂₀) ≤ S₀ + V̂₀ + T₀.
     """
 
     falls_back: ClassVar[bool] = True
@@ -80,7 +81,8 @@ class PaperTank(AbstractTank):
 class TimeDomainTank(AbstractTank):
     """Passivity observer and controller in the time domain, after Hannaford and Ryu (2002).
 
-    The observer is E_k+1 = E_k − w_k, started at S₀ + T₀. The controller acts when E < 0: it adds, in the
+    The observer is E_k+1 = E_k − w_k, started at T₀. It takes the weight that the links lift for energy given
+    away, so it is for robots that carry their own. The controller acts when E < 0: it adds, in the
     same period, the damping −E / (Δt |φ̇|²) that would pay the debt within it, at most α_max. It gates no
     reference: what that gives shows at the port a moment later.
     """

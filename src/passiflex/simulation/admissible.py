@@ -132,9 +132,17 @@ def require_stable(problem: Problem) -> None:
         return
     loop = LinearLoop(problem)
     late = {problem.sampling.delay, problem.sampling.delay + problem.sampling.jitter}
-    _require_stable_fallback(loop, late)
-    if all(loop.radius(delay=d) < 1 for d in late):
+    changes = [{"stiffness": c.stiffness, "damping": c.damping} for c in problem.sampling.gains]
+    if all(loop.radius(delay=d, gains=gains) < 1 for d in late for gains in ({}, *changes)):
+        _require_stable_fallback(loop, late)
         return
+    if all(loop.radius(delay=d) < 1 for d in late):
+        raise UnstableLoopError(
+            f"the law of {problem.name!r} becomes unstable by its change of gains",
+            got="a K_x or D_x in `gains` that does not hold at this rate and delay",
+            needs="gains between which the loop stays stable",
+            try_="passiflex limits, which maps K_x and D_x; or control.insist: true",
+        )
     found = _judged(loop, max(late))
     raise UnstableLoopError(
         f"the law is unstable at the rate and delay of {problem.name!r}",
@@ -150,6 +158,7 @@ def _require_stable_fallback(loop: LinearLoop, late: set[float]) -> None:
     if tank is None or not tank.falls_back:
         return
     gains = loop.fallback()
+    loop = loop.without_actions()  # the valve of a law that has fallen back is shut
     radius = max(loop.radius(delay=d, gains=gains) for d in late)
     if radius < 1:
         return

@@ -51,7 +51,9 @@ class Control(Section):
 
     rate: Annotated[float, Quantity("Hz", above=0, most=1e6)] = Field(description="control rate, Hz")
     delay: Instant = Field(
-        default=0.0, description="from a sample to the arrival of its command, any number of periods, s"
+        default=0.0,
+        description="from a sample to the arrival of its command, s; the matched inner loop predicts over "
+        "whole periods",
     )
     jitter: Instant = Field(
         default=0.0, description="each command is late by up to this much more, uniformly, s"
@@ -130,6 +132,10 @@ class Actions(Section):
 
     posture_stiffness: Annotated[float | Vector, Quantity("N m/rad", PerJoint, least=0)] = Field(
         default=0.0, description="of a spring in the null space toward `posture`, N m/rad"
+    )
+    posture_damping: Annotated[float | Vector, Quantity("N m s/rad", PerJoint, least=0)] | None = Field(
+        default=None,
+        description="of the same motion, N m s/rad; a ratio of 0.7 of each joint at the start if left out",
     )
     posture: Annotated[Vector, Quantity("rad", ((None,),))] | None = Field(
         default=None, description="joint angles that this spring pulls to, rad; the start if left out"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
@@ -132,6 +133,13 @@ class LinearLoop:
             drifting=values.size - kept.size,
         )
 
+    def without_actions(self) -> LinearLoop:
+        """Return the loop with the tank's valve shut."""
+        still = {"posture_stiffness": np.zeros(self.n)}
+        numbers = replaced(self.parts, self.s.numbers, still, "actions")
+        sampling = dataclasses.replace(self.s, numbers=numbers)
+        return LinearLoop(dataclasses.replace(self.problem, sampling=sampling))
+
     def fallback(self) -> dict[str, Array]:
         """Return the gains of the law that takes over when the tank is overdrawn."""
         before = self.parts[: self.parts._fields.index("fallback")]
@@ -234,10 +242,10 @@ class LinearLoop:
         """Return the derivative of (memory, command) by (x, memory, and noise if wanted) of one period at rest."""
         control, told = self.compiled.control, self.compiled.loop.row.slices["torque_noise"]
         own = self.parts.gains.unpack(self.problem.gains) | {k: np.asarray(v) for k, v in gains.items()}
-        numbers = replaced(
-            self.parts, replaced(self.parts, self.numbers, own, "gains"), {"period": period}, "inner"
-        )
-        memory, row = loop_at_rest(self.problem, self.compiled.loop, own, period)
+        memory, row, phi = loop_at_rest(self.problem, self.compiled.loop, own, period)
+        numbers = replaced(self.parts, self.numbers, own, "gains")
+        numbers = replaced(self.parts, numbers, {"period": period}, "inner")
+        numbers = replaced(self.parts, numbers, {"posture": phi}, "actions")  # at rest, that spring is slack
         n_x, n_c = self.x.size, self.remembered.size
 
         def evaluate(points: Array) -> Array:

@@ -21,10 +21,11 @@ BRIMFUL = 1e6
 
 
 class AtRest(NamedTuple):
-    """Memory and row of a period at rest, flat: `SampledLoop.memory` and `SampledLoop.row`."""
+    """Memory and row of a period at rest, flat: `SampledLoop.memory` and `SampledLoop.row`; and φ (n,)."""
 
     memory: Array
     row: Array
+    phi: Array
 
 
 def loop_at_rest(problem: Problem, loop: SampledLoop, gains: Mapping[str, Array], period: float) -> AtRest:
@@ -67,7 +68,7 @@ def loop_at_rest(problem: Problem, loop: SampledLoop, gains: Mapping[str, Array]
         "elapsed": period,
     }
     known |= {f.name: np.tile(s.held, (f.shape[0], 1)) for f in loop.memory if f.name == "in_flight"}
-    return AtRest(_packed(loop.memory, known), _packed(loop.row, row))
+    return AtRest(_packed(loop.memory, known), _packed(loop.row, row), shaped)
 
 
 def _packed(layout: Layout, known: Mapping[str, Any]) -> Array:

@@ -51,6 +51,8 @@ EXTERNAL: dict[str, AbstractExternalTorque] = {
     "none": NoTorque(),
 }
 
+POSTURE_RATIO = 0.7
+"""Damping ratio of the spring to a posture, joint by joint, unless its damping is given."""
 INNER: dict[str, Callable[[int], AbstractInnerLoop]] = {
     "plain": lambda late: PlainInnerLoop(),
     "matched": MatchedInnerLoop,
@@ -94,13 +96,14 @@ def sampling(
     }
     parts = SampledLoop(controller).parameters
     plant_numbers = parts.plant.pack(plant | friction)
+    moved = np.diag(start.mass_matrix) + gains.get("shaped_inertia", model["motor_inertia"])
     numbers = [
         plant_numbers,
         parts.model.pack(model),
         parts.gains.pack(gains),
         parts.fallback.pack(_fallback(control, scenario, robot, model, gains)),
         parts.tank.pack(_tank(tank)),
-        parts.actions.pack(_actions(scenario.actions or Actions(), robot, q)),
+        parts.actions.pack(_actions(scenario.actions or Actions(), robot, q, moved)),
         parts.observer.pack({"bandwidth": _pole(control.observer_bandwidth)}),
         parts.inner.pack(
             {
@@ -179,7 +182,10 @@ def _tank(tank: TankSettings | None) -> dict[str, float]:
     }
 
 
-def _actions(actions: Actions, robot: FlexibleJointRobot, q: Array) -> dict[str, Array | float]:
+def _actions(
+    actions: Actions, robot: FlexibleJointRobot, q: Array, inertia: Array
+) -> dict[str, Array | float]:
+    """Return the numbers of the actions; `inertia` (n,) is what each joint moves at the start, B_e included."""
     posture = q if actions.posture is None else np.array(actions.posture)
     if posture.shape != (robot.n,):
         raise SizeError(
@@ -187,8 +193,13 @@ def _actions(actions: Actions, robot: FlexibleJointRobot, q: Array) -> dict[str,
             got=f"{posture.size} angles",
             needs=f"{robot.n} angles in rad",
         )
+    stiffness = _joints(robot, "actions.posture_stiffness", actions.posture_stiffness)
+    damping: ArrayLike = 2 * POSTURE_RATIO * np.sqrt(stiffness * inertia)
+    if actions.posture_damping is not None:
+        damping = actions.posture_damping
     return {
-        "posture_stiffness": _joints(robot, "actions.posture_stiffness", actions.posture_stiffness),
+        "posture_stiffness": stiffness,
+        "posture_damping": _joints(robot, "actions.posture_damping", damping),
         "posture": posture,
         "follow_velocity": actions.follow_velocity,
         "follow_acceleration": actions.follow_acceleration,

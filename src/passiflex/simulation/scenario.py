@@ -201,6 +201,8 @@ class Scenario(Section):
             raise Mistakes(
                 *(((name,), "needs `control`: only a sampled tank has it") for name in tank.only_sampled)
             )
+        if "law" in info.data:
+            tank.require(info.data["law"].gravity)
         return tank.completed("port" if sampled else "paper")
 
     @field_validator("control")

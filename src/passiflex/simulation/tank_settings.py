@@ -79,6 +79,14 @@ class TankSettings(Section):
         left_out = name not in self.model_fields_set and self.kind in (None, "port")
         return PORT_DEFAULTS[name] if left_out else getattr(self, name)
 
+    def require(self, gravity: str) -> None:
+        """Raise Mistakes if the tank's books are wrong for this choice of gravity."""
+        if self.kind == "time_domain" and gravity != "robot":
+            what = (
+                "takes the weight that is lifted for energy given away; take law.gravity: robot, or kind port"
+            )
+            raise Mistakes((("kind",), what))
+
     def completed(self, kind: Literal["paper", "port"]) -> Self:
         """Return the settings with `kind` and the accounting that goes with it, where they were left out."""
         given = self.model_dump(exclude_unset=True, exclude_none=True)

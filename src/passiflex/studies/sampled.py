@@ -50,7 +50,7 @@ def _paper_gains(scenario: Scenario, tank: str, motors: MotorSettings) -> Scenar
     assert isinstance(printed, ImpedanceSettings)
     assert scenario.control is not None
     control = _changed_section(scenario.control, inner_loop="plain", external_torque="measured", insist=True)
-    tank_settings = TankSettings.model_validate({"kind": tank, "initial": 2.0})
+    tank_settings = TankSettings.model_validate({"kind": tank, "initial": 2.0}).completed("port")
     return _changed(scenario, law=printed, control=control, tank=tank_settings, motors=motors)
 
 
