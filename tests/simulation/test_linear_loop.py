@@ -16,7 +16,7 @@ from passiflex.robots import FlexibleJointRobot
 from passiflex.robots.arm import SerialArm
 from passiflex.robots.chain import Body, Joint, SerialChain
 from passiflex.simulation import Problem, parse_scenario, resolve
-from passiflex.simulation.linear_loop import LinearLoop
+from passiflex.simulation.linear_loop import REMEMBERED, LinearLoop
 from passiflex.simulation.loop_at_rest import loop_at_rest
 from passiflex.simulation.simulate_sampled import longest_step, start
 from passiflex.studies import shipped_scenario
@@ -250,3 +250,23 @@ def test_limits_resolution_and_friction_are_left_out() -> None:
 def test_a_problem_in_continuous_time_has_no_such_matrix() -> None:
     with pytest.raises(ValueRangeError, match="has no control rate"):
         LinearLoop(dataclasses.replace(planar({}), sampling=None))
+
+
+@pytest.mark.parametrize("inner", ["plain", "matched"])
+def test_nothing_else_that_is_remembered_acts_back(inner: str) -> None:
+    """While the tank is full: a new memory that acts on the command must be named in `REMEMBERED`."""
+    problem = resolve(world(control={"inner_loop": inner, "external_torque": "observer", "delay": PERIOD}))
+    loop = LinearLoop(problem)
+    gains = loop.parts.gains.unpack(problem.gains)
+    memory, row, _ = loop_at_rest(problem, loop.compiled.loop, gains, PERIOD)
+    layout, control = loop.compiled.loop.memory, loop.compiled.control
+    _, command, _ = control(loop.x, memory, row, loop.numbers)
+    acting = []
+    for f in layout:
+        moved = memory.copy()
+        moved[layout.slices[f.name]] += 1e-6
+        _, other, _ = control(loop.x, moved, row, loop.numbers)
+        if np.abs(other - command).max() > 1e-9:
+            acting.append(f.name)
+    assert set(acting) <= set(REMEMBERED)
+    assert bool({"seen_theta", "in_flight"} & set(acting)) == (inner == "matched")
