@@ -41,10 +41,10 @@ def joint_flow(K: cs.SX, D: cs.SX, B: cs.SX, T: cs.SX) -> JointFlow:
     o = cs.fmax(cs.sqrt(cs.fabs(square)), 1e-9)
     swings = square > 0
     fade = cs.exp(-s * T)
-    sine = cs.if_else(swings, cs.sin(o * T), cs.sinh(o * T)) / o
-    cosine = cs.if_else(swings, cs.cos(o * T), cs.cosh(o * T))
-    push = fade * sine
-    return JointFlow(fade * cosine + s * push, push, fade * cosine - s * push)
+    slow, fast = cs.exp((o - s) * T), cs.exp(-(o + s) * T)  # if overdamped, both ≤ 1
+    push = cs.if_else(swings, fade * cs.sin(o * T), (slow - fast) / 2) / o
+    mean = cs.if_else(swings, fade * cs.cos(o * T), (slow + fast) / 2)
+    return JointFlow(mean + s * push, push, mean - s * push)
 
 
 @final
