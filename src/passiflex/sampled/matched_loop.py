@@ -22,6 +22,9 @@ from passiflex.layout import Field, Layout
 from passiflex.robots.linear_algebra import solve_spd
 from passiflex.sampled.inner_loop import AbstractInnerLoop, Seen
 
+SLOW = 1e-2
+"""Least frequency [1/s] that is told from critical damping; over a period the difference is below 1e-8."""
+
 
 class JointFlow(NamedTuple):
     """Motor against a link of given velocity, over one period: deflection and its rate, exactly.
@@ -38,7 +41,7 @@ def joint_flow(K: cs.SX, D: cs.SX, B: cs.SX, T: cs.SX) -> JointFlow:
     """Return the flow of B δ̈ + D δ̇ + K δ = 0 over T, elementwise, under- or overdamped."""
     s = D / (2 * B)
     square = K / B - s * s
-    o = cs.fmax(cs.sqrt(cs.fabs(square)), 1e-9)
+    o = cs.fmax(cs.sqrt(cs.fabs(square)), SLOW)
     swings = square > 0
     fade = cs.exp(-s * T)
     slow, fast = cs.exp((o - s) * T), cs.exp(-(o + s) * T)  # if overdamped, both ≤ 1
