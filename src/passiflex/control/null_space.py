@@ -5,7 +5,7 @@ from __future__ import annotations
 import casadi as cs
 
 from passiflex.control.signals import Contribution
-from passiflex.robots.linear_algebra import solve_spd
+from passiflex.robots.linear_algebra import half_solve_spd, solve_spd
 
 
 def inverse_cartesian_inertia(
@@ -15,7 +15,7 @@ def inverse_cartesian_inertia(
 
     Near a singular posture ε > 0 bounds Λ; it makes Λ smaller, so that D_ns of (35) stays ≥ 0.
     """
-    half = cs.solve(cs.chol(mass_matrix).T, jacobian.T)
+    half = half_solve_spd(mass_matrix, jacobian.T)
     return half.T @ half + regularisation * cs.SX.eye(jacobian.shape[0])
 
 
@@ -24,7 +24,7 @@ def null_space_damping(
 ) -> cs.SX:
     """Return D_ns = k_ns (M − Jᵀ Λ J) of (35) [N m s/rad], symmetric and ≥ 0; (33) is not needed."""
     mobility = inverse_cartesian_inertia(mass_matrix, jacobian, regularisation)
-    half = cs.solve(cs.chol(mobility).T, jacobian)  # halfᵀ half = Jᵀ Λ J, symmetric to the last bit
+    half = half_solve_spd(mobility, jacobian)  # halfᵀ half = Jᵀ Λ J, symmetric to the last bit
     return gain * (mass_matrix - half.T @ half)
 
 
