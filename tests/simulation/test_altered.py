@@ -128,6 +128,25 @@ def test_at_rate_says_what_altered_does() -> None:
     assert at_rate(scenario) == scenario
 
 
+@pytest.mark.parametrize("periods", [1, 3])
+@pytest.mark.parametrize("change", [{"rate": 2300.0}, {"rate": 400.0, "delay": 0.0}, {"delay": 2e-3}, {}])
+def test_noise_is_held_for_as_many_periods_as_before(periods: int, change: dict[str, float]) -> None:
+    before = problem(noise={"torque_variance": 0.1, "hold": periods * 1e-3})
+    after = altered(before, **change)
+    assert after.sampling is not None
+    assert after.noise is not None
+    assert after.noise.hold == periods * after.sampling.period
+    require_same(after, resolve(parse_scenario(after.configuration)))
+    require_same(after, resolve(at_rate(parse_scenario(before.configuration), **change)))
+
+
+def test_noise_of_a_scenario_in_continuous_time_is_drawn_in_each_period() -> None:
+    noise = {"torque_variance": 0.1, "hold": 1e-3}
+    sampled = at_rate(world(control=None, tank=None, noise=noise), 400.0)
+    assert sampled.noise is not None
+    assert sampled.noise.hold == 2.5e-3
+
+
 @pytest.mark.parametrize(
     ("change", "kind", "message"),
     [

@@ -203,13 +203,32 @@ ONLY = "needs `control`: only a sampled run has it"
         ("from: 100 ms", "from: 0.3", "line 21, column 25, drags[0].to: needs to be later than from = 0.3 s; got 0.2 s"),
         ("from: 100 ms, to: 0.2", "from: 600 ms, to: 2", "line 21, column 16, drags[0].from: needs to be earlier than the end, 0.6 s; got 0.6 s"),
         ("3 N s/m", "-3", "line 21, column 42, drags[0].viscous: expected N s/m, one number, ≥ 0; got -3 (too small)"),
-        ("0.5 ms", "1 ms", "line 22, column 37, noise.hold: needs to be the control period, 0.0005 s: sensors are read once in it; got 0.001 s"),
+        ("0.5 ms", "0.8 ms", "line 22, column 37, noise.hold: needs a whole multiple of the control period, 0.0005 s: sensors are read once in it; got 0.0008 s"),
+        ("0.5 ms", "0.1 ms", "line 22, column 37, noise.hold: needs a whole multiple of the control period, 0.0005 s: sensors are read once in it; got 0.0001 s"),
+        ("control: {rate: 2 kHz, delay: 0.75 ms}", "control: {rate: 0}", "line 12, column 17, control.rate: expected Hz, one number, > 0, ≤ 1e+06; got 0 (too small)"),
         ("noise: {torque_variance: 0.2, hold: 0.5 ms}", "output_interval: 0.7 ms", "line 22, column 18, output_interval: needs a whole multiple of the period, 0.0005 s; got 0.0007 s"),
-        ("duration: 0.6\n", "duration: 0.6\noutput_interval: 0.1 ms\n", "line 24, column 18, output_interval: needs a whole multiple of noise.hold, 0.0005 s; got 0.0001 s"),
+        ("duration: 0.6\n", "duration: 0.6\noutput_interval: 0.1 ms\n", "line 24, column 18, output_interval: needs a whole multiple of the period, 0.0005 s; got 0.0001 s"),
     ],
 )  # fmt: skip
 def test_each_mistake_is_one_line(old: str, new: str, line: str) -> None:
     assert mistakes(changed(old, new)) == [line]
+
+
+@pytest.mark.parametrize(("hold", "seconds"), [("0.5 ms", 5e-4), ("1.5 ms", 1.5e-3), ("0.1 s", 0.1)])
+def test_noise_is_held_for_whole_periods_and_rows_need_not_fit_it(hold: str, seconds: float) -> None:
+    """3 periods of 0.5 ms divide no 5 ms, the default between two rows."""
+    s = parse_scenario(changed("hold: 0.5 ms", f"hold: {hold}"))
+    assert s.noise is not None
+    assert (s.noise.hold, s.output_interval) == (seconds, 0.005)
+    noise = resolve(s).noise
+    assert noise is not None
+    assert noise.hold == seconds
+
+
+def test_noise_without_a_hold_is_held_for_a_millisecond_at_any_rate_that_divides_it() -> None:
+    s = parse_scenario(changed(", hold: 0.5 ms", ""))
+    assert s.noise is not None
+    assert s.noise.hold == 1e-3
 
 
 def test_without_a_rate_nothing_sampled_is_allowed() -> None:

@@ -13,7 +13,9 @@ from hypothesis import strategies as st
 
 from passiflex.errors import ScenarioError
 from passiflex.simulation.law_settings import ImpedanceSettings, RigidSettings
-from passiflex.simulation.scenario import Circle, Hold, Move, Noise, Scenario, Step, TankSettings
+from passiflex.simulation.model_errors import Deviations, ModelErrors
+from passiflex.simulation.noise_settings import Noise
+from passiflex.simulation.scenario import Circle, Hold, Move, Scenario, Step, TankSettings
 from passiflex.simulation.scenario_file import MAX_BYTES, load_scenario, parse_scenario
 
 GOOD = """\
@@ -82,6 +84,15 @@ def test_a_complete_file():
     assert s.tank.cap == math.inf
     assert s.noise == Noise(torque_variance=0.2, hold=0.001)
     assert (s.output_interval, s.tolerance, s.seed) == (0.005, 1e-10, 0)
+
+
+def test_deviations_and_model_errors_are_for_all_joints_or_one_each():
+    assert parse_scenario(GOOD).deviations == Deviations()
+    written = "deviations: {joint_stiffness: [10 %, -0.2], link_inertia: 5 %}\nmodel_errors: {motor_inertia: [1, 2 %]}"
+    s = parse_scenario(changed("model_errors: {joint_stiffness: 50 %}", written))
+    assert s.deviations == Deviations(joint_stiffness=(0.1, -0.2), link_inertia=0.05)
+    assert s.model_errors == ModelErrors(motor_inertia=(1.0, 0.02))
+    assert parse_scenario(s.to_yaml()) == s
 
 
 def test_the_rigid_law_has_no_tank_and_a_position_task_has_three_directions():
@@ -246,7 +257,22 @@ SHAPED = "shaped_stiffness: {ratio: 10}"
         (
             "50 %",
             "-100 %",
-            "line 18, column 33, model_errors.joint_stiffness: expected one number, > -1; got '-100 %' (too small)",
+            "line 18, column 33, model_errors.joint_stiffness: expected one number or a list of numbers, > -1; got '-100 %' (too small)",
+        ),
+        (
+            "model_errors: {joint_stiffness: 50 %}",
+            "deviations: {link_inertia: [10 %, -1]}",
+            "line 18, column 28, deviations.link_inertia: expected one number or a list of numbers, > -1; got ['10 %', -1] (too small)",
+        ),
+        (
+            "model_errors: {joint_stiffness: 50 %}",
+            "deviations: {joint_damping: inf}",
+            "line 18, column 29, deviations.joint_damping: expected one number or a list of numbers, > -1; got 'inf' (not finite)",
+        ),
+        (
+            "model_errors: {joint_stiffness: 50 %}",
+            "deviations: {link_mass: 3}",
+            "line 18, column 14, deviations.link_mass: unknown name; try 'link_inertia'",
         ),
         (
             "1e-10",

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import numpy as np
 import yaml
@@ -84,6 +84,7 @@ class RobotDescription:
 
     `stiffness`, `damping`, `motor_inertia`, `torque_limit` and `velocity_limit` are (n,); `position_limit` is
     (n, 2), lower and upper bounds. `sources` says where numbers come from, by entry of the file and `links`.
+    The arrays are read-only: whoever reads the same files gets the same description.
     """
 
     name: str
@@ -95,7 +96,19 @@ class RobotDescription:
     torque_limit: Array
     velocity_limit: Array
     position_limit: Array
-    sources: dict[str, str]
+    sources: Mapping[str, str]
+
+
+class _Known(NamedTuple):
+    """A robot that was read, and what its two files held then."""
+
+    content: bytes
+    urdf: Path
+    links: bytes
+    robot: RobotDescription
+
+
+_KNOWN: dict[Path, _Known] = {}
 
 
 def catalogue() -> tuple[str, ...]:
@@ -106,6 +119,8 @@ def catalogue() -> tuple[str, ...]:
 
 def read_description(name_or_path: str | Path) -> RobotDescription:
     """Return a robot of the catalogue by name, or a user's by the path of its YAML file.
+
+    It is the same object each time, until one of its files changes.
 
     Raises
     ------
@@ -124,15 +139,26 @@ def read_description(name_or_path: str | Path) -> RobotDescription:
 
 
 def _read(path: Path) -> RobotDescription:
-    """Return the robot of one YAML file."""
-    file = _parse(path)
+    """Return the robot of one YAML file, the one that is known if both files hold what they held."""
+    try:
+        content = path.read_bytes()
+    except OSError as e:
+        raise RobotError(f"robot file {str(path)!r} cannot be read", got=e, needs="a YAML file") from e
+    known = _KNOWN.get(path)
+    if known and known.content == content and known.links == _held(known.urdf):
+        return known.robot
+    file = _parse(path, content)
     urdf = path.parent / file.urdf
     if not urdf.is_file():
         needs = "a path, absolute or from the folder of this file"
         raise RobotError(f"{path}: entry urdf: no such file", got=repr(str(urdf)), needs=needs)
+    links = _held(urdf)
     chain = SerialChain.from_urdf(urdf, file.end_effector)
     values = {entry: _in_si(path, entry, getattr(file, entry), chain) for entry in UNITS}
-    return RobotDescription(
+    parts = (*chain.joints, *chain.bodies, (chain.tip_xyz, chain.tip_rotation), values.values())
+    for array in (a for part in parts for a in part if isinstance(a, np.ndarray)):
+        array.setflags(write=False)
+    robot = RobotDescription(
         name=file.name,
         description=file.description,
         chain=chain,
@@ -144,13 +170,24 @@ def _read(path: Path) -> RobotDescription:
         position_limit=values["position_limit"],
         sources={"links": file.source} | {entry: getattr(file, entry).source for entry in UNITS},
     )
+    if links is not None:
+        _KNOWN[path] = _Known(content, urdf, links, robot)
+    return robot
 
 
-def _parse(path: Path) -> RobotFile:
+def _held(urdf: Path) -> bytes | None:
+    """Return what a URDF file holds, or None where it cannot be read."""
+    try:
+        return urdf.read_bytes()
+    except OSError:
+        return None
+
+
+def _parse(path: Path, data: bytes) -> RobotFile:
     """Return the entries of one YAML file, complete and of the right types."""
     try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as e:
+        content = yaml.safe_load(data.decode("utf-8"))
+    except UnicodeDecodeError as e:
         raise RobotError(f"robot file {str(path)!r} cannot be read", got=e, needs="a YAML file") from e
     except yaml.YAMLError as e:
         mark = getattr(e, "problem_mark", None)

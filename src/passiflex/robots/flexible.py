@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
 from types import SimpleNamespace
 from typing import NamedTuple
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 from passiflex.errors import SizeError, ValueRangeError
 from passiflex.layout import Field, Layout
 from passiflex.robots.arm import SerialArm
-from passiflex.robots.catalogue import read_description
+from passiflex.robots.catalogue import RobotDescription, read_description
 from passiflex.robots.linear_algebra import solve_spd
 
 
@@ -62,7 +63,7 @@ class FlexibleJointRobot:
     torque_limit: NDArray[np.float64]
     velocity_limit: NDArray[np.float64]
     position_limit: NDArray[np.float64]
-    sources: dict[str, str] = field(default_factory=dict)
+    sources: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for name in ("joint_stiffness", "joint_damping", "motor_inertia"):
@@ -78,25 +79,16 @@ class FlexibleJointRobot:
 
     @classmethod
     def load(cls, name: str | Path = "iiwa14") -> FlexibleJointRobot:
-        """Read a robot of the catalogue by name, or the user's own by the path of its file.
+        """Return a robot of the catalogue by name, or the user's own by the path of its file.
+
+        It is the same object, with read-only arrays, until one of its files changes.
 
         Raises
         ------
         NameUnknownError, RobotError
             If there is no such robot, or its description is not usable.
         """
-        d = read_description(name)
-        return cls(
-            name=d.name,
-            arm=SerialArm(d.chain),
-            joint_stiffness=d.stiffness,
-            joint_damping=d.damping,
-            motor_inertia=d.motor_inertia,
-            torque_limit=d.torque_limit,
-            velocity_limit=d.velocity_limit,
-            position_limit=d.position_limit,
-            sources=d.sources,
-        )
+        return _built(read_description(name))
 
     @property
     def n(self) -> int:
@@ -118,9 +110,9 @@ class FlexibleJointRobot:
     def nominal(self, gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)) -> dict[str, np.ndarray]:
         """Return the robot's own numbers for `layout`."""
         return self.arm.nominal(gravity) | {
-            "joint_stiffness": self.joint_stiffness,
-            "joint_damping": self.joint_damping,
-            "motor_inertia": self.motor_inertia,
+            "joint_stiffness": np.array(self.joint_stiffness),
+            "joint_damping": np.array(self.joint_damping),
+            "motor_inertia": np.array(self.motor_inertia),
         }
 
     def joint_torque(self, x: RobotState, m: SimpleNamespace) -> cs.SX:
@@ -135,3 +127,19 @@ class FlexibleJointRobot:
             ddtheta=(tau_m - tau_a) / m.motor_inertia,
             tau_a=tau_a,
         )
+
+
+@lru_cache(maxsize=32)
+def _built(d: RobotDescription) -> FlexibleJointRobot:
+    """Return the robot of a description; the same for the same one, as functions are compiled for its arm."""
+    return FlexibleJointRobot(
+        name=d.name,
+        arm=SerialArm(d.chain),
+        joint_stiffness=d.stiffness,
+        joint_damping=d.damping,
+        motor_inertia=d.motor_inertia,
+        torque_limit=d.torque_limit,
+        velocity_limit=d.velocity_limit,
+        position_limit=d.position_limit,
+        sources=d.sources,
+    )

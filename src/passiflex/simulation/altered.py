@@ -42,7 +42,7 @@ def altered(
 ) -> Problem:
     """Return the sampled problem with what is given in place of its own; what is left out stays.
 
-    The inner loop predicts over the new delay, the noise has the new period, the arm rests under its new
+    The inner loop predicts over the new delay, the noise is held for as many periods, the arm rests under its new
     weight, the reference begins where the end effector now is, and the configuration says so.
 
     Parameters
@@ -85,7 +85,9 @@ def altered(
         problem,
         gains=law.layout.pack(own),
         plant=law.robot.layout.pack(true),
-        noise=problem.noise._replace(hold=period) if problem.noise else None,
+        noise=problem.noise._replace(hold=_held(problem.noise.hold, s.period) * period)
+        if problem.noise
+        else None,
         output_interval=float(data["output_interval"]),
         configuration=_text(data),
         sampling=dataclasses.replace(
@@ -214,12 +216,18 @@ def _rebased(motion: Motion, old: Pose, new: Pose) -> Motion:
 
 def _write_timing(data: dict[str, Any], period: float, delay: float, rate: float | None) -> None:
     control = data.setdefault("control", {})
+    if data.get("noise"):  # a scenario in continuous time gets a sample in each period
+        own = 1 / control["rate"] if "rate" in control else data["noise"]["hold"]
+        data["noise"]["hold"] = float(_held(data["noise"]["hold"], own) * period)
     control["delay"] = float(delay)
     if rate is not None:
         control["rate"] = float(rate)
-    if data.get("noise"):
-        data["noise"]["hold"] = float(period)
     data["output_interval"] = float(max(1, round(data["output_interval"] / period)) * period)
+
+
+def _held(hold: float, period: float) -> int:
+    """Return for how many periods a sample of the noise is held."""
+    return round(hold / period)
 
 
 def _write_gains(law: dict[str, Any], gains: dict[str, Array]) -> None:

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import casadi as cs
 import numpy as np
 from numpy.typing import NDArray
 
 from passiflex.control.damping_design import damping_from_ratio
 from passiflex.control.law import AbstractLaw
-from passiflex.control.null_space import inverse_cartesian_inertia
 from passiflex.control.tank import NO_CAP, EnergyTank
 from passiflex.errors import SizeError
 from passiflex.robots.flexible import FlexibleJointRobot
@@ -96,10 +94,9 @@ def _damping(s: ImpedanceSettings | RigidSettings, stiffness: Array, inertia: Ar
 
 
 def _natural_inertia(size: int, start: Posture, regularisation: float) -> Array:
-    mobility = inverse_cartesian_inertia(
-        cs.SX(start.mass_matrix), cs.SX(start.jacobian[:size]), regularisation
-    )
-    return _symmetric(np.linalg.inv(np.array(cs.DM(mobility))))
+    J = start.jacobian[:size]
+    mobility: Array = J @ np.linalg.solve(start.mass_matrix, J.T) + regularisation * np.eye(size)  # (31)
+    return _symmetric(np.linalg.inv(mobility).astype(np.float64))
 
 
 def _symmetric(matrix: Array) -> Array:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import ValidationError
 from scipy.spatial.transform import Rotation
 
 from passiflex.control.gravity import AbstractGravity, MotorGravity, RobotGravity, StaticGravity
@@ -14,6 +15,7 @@ from passiflex.errors import SizeError, ValueRangeError
 from passiflex.robots.flexible import FlexibleJointRobot
 from passiflex.simulation.gains import law_gains, tank_gains, tank_start
 from passiflex.simulation.law_settings import RigidSettings
+from passiflex.simulation.model_errors import AbstractRelative
 from passiflex.simulation.posture import SINGULAR, posture
 from passiflex.simulation.problem import Noise, Problem
 from passiflex.simulation.sampling import sampling
@@ -31,6 +33,13 @@ GRAVITIES: dict[str, AbstractGravity] = {
     "static": StaticGravity(),
     "model": StaticGravity(),  # the rigid law cancels by its model; its plant has gravity
 }
+SCALED = {
+    "joint_stiffness": ("joint_stiffness",),
+    "joint_damping": ("joint_damping",),
+    "motor_inertia": ("motor_inertia",),
+    "link_inertia": ("link_mass", "link_inertia"),
+}
+"""Entry of `deviations` and `model_errors` → the numbers of `FlexibleJointRobot.layout` that it scales."""
 SLOWEST_CONTRACTION = 0.1
 """Largest |∇²V| / K_e for the static compensation: its eight steps then reach 1e-8 of the weight."""
 REGULAR = 1e-6
@@ -45,18 +54,17 @@ def resolve(scenario: Scenario, robot: FlexibleJointRobot | None = None) -> Prob
     PassiflexError
         If the robot cannot be loaded, a size does not fit it, a start is outside the robot's limits or singular.
     """
-    scenario = parse_scenario(
-        scenario.to_yaml(), source=f"scenario {scenario.name!r}"
-    )  # it may be a changed copy
+    scenario = _checked(scenario)
     if robot is None:
         robot = FlexibleJointRobot.load(scenario.robot)
     else:  # what is stored beside the result must not pass for the scenario's own robot
         scenario = scenario.model_copy(update={"robot": f"{robot.name}, changed in memory"})
     law = _law(scenario, robot)
     q = _start(scenario, robot)
-    plant = robot.nominal(STANDARD_GRAVITY if law.gravity.in_model else (0.0, 0.0, 0.0))
-    plant |= _tool(scenario, plant)
-    model = _with_errors(scenario, plant)
+    described = robot.nominal(STANDARD_GRAVITY if law.gravity.in_model else (0.0, 0.0, 0.0))
+    described |= _tool(scenario, described)
+    plant = _scaled(described, "deviations", scenario.deviations, robot)
+    model = _scaled(described, "model_errors", scenario.model_errors, robot)
     at_start = posture(robot, q, plant)
     _refuse_singular(scenario, at_start.jacobian[: law.task.size])
     gains = law_gains(scenario, law, model, posture(robot, q, model))
@@ -67,6 +75,8 @@ def resolve(scenario: Scenario, robot: FlexibleJointRobot | None = None) -> Prob
         theta - q
     )
     home = posture(robot, shaped, model).pose
+    # The law's own damping goes by the robot as described; its weight is the true one.
+    start = at_start._replace(mass_matrix=posture(robot, q, described).mass_matrix)
     return Problem(
         name=scenario.name,
         law=law,
@@ -85,8 +95,17 @@ def resolve(scenario: Scenario, robot: FlexibleJointRobot | None = None) -> Prob
         tolerance=scenario.tolerance,
         seed=scenario.seed,
         configuration=scenario.to_yaml(),
-        sampling=sampling(scenario, law, plant, model, gains, q, at_start) if scenario.control else None,
+        sampling=sampling(scenario, law, plant, model, gains, q, start) if scenario.control else None,
     )
+
+
+def _checked(scenario: Scenario) -> Scenario:
+    """Return the scenario validated anew, as it may be a changed copy."""
+    try:
+        data = scenario.model_dump(by_alias=True, exclude_none=True, warnings=False)
+        return Scenario.model_validate(data)
+    except ValidationError:  # with the line and column that a mistake has in the scenario's own text
+        return parse_scenario(scenario.to_yaml(), source=f"scenario {scenario.name!r}")
 
 
 def _law(scenario: Scenario, robot: FlexibleJointRobot) -> AbstractLaw:
@@ -157,20 +176,27 @@ def _refuse_soft(robot: FlexibleJointRobot, q: Array, model: dict[str, Array], K
         )
 
 
-def _tool(scenario: Scenario, plant: dict[str, Array]) -> dict[str, Array]:
-    rotation = plant["tool_rotation"]
+def _tool(scenario: Scenario, described: dict[str, Array]) -> dict[str, Array]:
+    rotation = described["tool_rotation"]
     offset = rotation @ np.array(scenario.tool.position)
     turn = Rotation.from_rotvec(scenario.tool.rotation_vector).as_matrix()
-    return {"tool_position": plant["tool_position"] + offset, "tool_rotation": rotation @ turn}
+    return {"tool_position": described["tool_position"] + offset, "tool_rotation": rotation @ turn}
 
 
-def _with_errors(scenario: Scenario, plant: dict[str, Array]) -> dict[str, Array]:
-    e = scenario.model_errors
-    factors = {
-        "joint_stiffness": e.joint_stiffness,
-        "joint_damping": e.joint_damping,
-        "motor_inertia": e.motor_inertia,
-        "link_mass": e.link_inertia,
-        "link_inertia": e.link_inertia,
-    }
-    return {name: value * (1 + factors.get(name, 0.0)) for name, value in plant.items()}
+def _scaled(
+    described: dict[str, Array], entry: str, relative: AbstractRelative, robot: FlexibleJointRobot
+) -> dict[str, Array]:
+    """Return the robot's numbers times 1 + `relative`, which is the scenario's section `entry`."""
+    scaled = dict(described)
+    for name, numbers in SCALED.items():
+        value = np.asarray(getattr(relative, name))
+        if value.size not in (1, robot.n):
+            raise SizeError(
+                f"{entry}.{name} does not fit robot {robot.name!r}",
+                got=f"{value.size} numbers",
+                needs=f"one number or {robot.n}",
+            )
+        for number in numbers:
+            rows = described[number].reshape(robot.n, -1)
+            scaled[number] = (rows * (1 + value.reshape(-1, 1))).reshape(described[number].shape)
+    return scaled

@@ -20,6 +20,8 @@ from passiflex.simulation.control_settings import (
     gain_mistakes,
 )
 from passiflex.simulation.law_settings import ImpedanceSettings, RigidSettings
+from passiflex.simulation.model_errors import Deviations, ModelErrors
+from passiflex.simulation.noise_settings import Noise, is_multiple
 from passiflex.simulation.quantity import Quantity, shown
 from passiflex.simulation.section import Mistakes, Section
 from passiflex.simulation.tank_settings import TankSettings
@@ -29,7 +31,6 @@ Seconds = Annotated[float, Quantity("s", above=0)]
 Instant = Annotated[float, Quantity("s", least=0)]
 Length = Annotated[Vector, Quantity("m", ((3,),))]
 Turn = Annotated[Vector, Quantity("rad", ((3,),))]
-RelativeError = Annotated[float, Quantity("1", above=-1)]
 ZERO = (0.0, 0.0, 0.0)
 
 
@@ -101,26 +102,6 @@ class Force(Interval):
     )
 
 
-class ModelErrors(Section):
-    """By how much the law's model is wrong, relative to the robot: 50 % means 1.5 times the truth."""
-
-    joint_stiffness: RelativeError = Field(default=0.0, description="relative error of K, > -100 %")
-    joint_damping: RelativeError = Field(default=0.0, description="relative error of D, > -100 %")
-    motor_inertia: RelativeError = Field(default=0.0, description="relative error of B, > -100 %")
-    link_inertia: RelativeError = Field(
-        default=0.0, description="relative error of the links' masses and inertias, > -100 %"
-    )
-
-
-class Noise(Section):
-    """White noise on the measured joint torque, held between samples."""
-
-    torque_variance: Annotated[float, Quantity("(N m)^2", least=0)] = Field(
-        description="variance per joint, (N m)^2"
-    )
-    hold: Seconds = Field(default=0.001, description="time between two samples, s")
-
-
 def _own_tank(data: dict[str, Any]) -> TankSettings | None:
     if not isinstance(data.get("law"), ImpedanceSettings):
         return None
@@ -159,7 +140,12 @@ class Scenario(Section):
         default=(), description="what the reference does, in the order of time"
     )
     forces: tuple[Force, ...] = Field(default=(), description="external forces on the end effector")
-    model_errors: ModelErrors = Field(default=ModelErrors(), description="errors of the law's model")
+    deviations: Deviations = Field(
+        default=Deviations(), description="by how much the robot differs from its description"
+    )
+    model_errors: ModelErrors = Field(
+        default=ModelErrors(), description="by how much the law's model differs from the robot's description"
+    )
     noise: Noise | None = Field(
         default=None,
         description="noise on the measured joint torque, which the rigid law does not use; none if left out",
@@ -177,8 +163,8 @@ class Scenario(Section):
     output_interval: Seconds = Field(
         default=0.005,
         validate_default=True,
-        description="time between two rows of the result, s; with noise a whole multiple of noise.hold, "
-        "with control of the period",
+        description="time between two rows of the result, s; with control a whole multiple of the period, "
+        "without it of noise.hold",
     )
     tolerance: Annotated[float, Quantity("1", least=1e-13, most=1e-3)] = Field(
         default=1e-9, description="relative tolerance of the integrator"
@@ -238,13 +224,10 @@ class Scenario(Section):
 
     @field_validator("noise")
     @classmethod
-    def _once_per_period(cls, noise: Noise | None, info: ValidationInfo) -> Noise | None:
+    def _whole_periods(cls, noise: Noise | None, info: ValidationInfo) -> Noise | None:
         control = info.data.get("control")
-        if noise is None or control is None:
-            return noise
-        if abs(noise.hold * control.rate - 1) > 1e-9:
-            needs = f"the control period, {1 / control.rate:g} s: sensors are read once in it"
-            raise Mistakes((("hold",), f"needs to be {needs}; got {noise.hold:g} s"))
+        if noise is not None and control is not None:
+            noise.require(control.rate)
         return noise
 
     @field_validator("reference")
@@ -284,14 +267,15 @@ class Scenario(Section):
         if interval > info.data.get("duration", float("inf")):
             needs = f"needs to be no longer than the duration, {info.data['duration']:g} s"
             raise ValueError(f"{needs}; got {interval:g} s")
-        noise, control = info.data.get("noise"), info.data.get("control")
-        for step, name in (
-            (noise and noise.hold, "noise.hold"),
-            (control and 1 / control.rate, "the period"),
-        ):
-            samples = interval / step if step else 1.0
-            if not 0.5 < samples < 1e9 or abs(samples - round(samples)) > 1e-9 * samples:
-                raise ValueError(f"needs a whole multiple of {name}, {step:g} s; got {interval:g} s")
+        noise, control = info.data.get("noise"), info.data.get("control", "in error")
+        if isinstance(control, Control):
+            step, name = 1 / control.rate, "the period"
+        elif noise is not None and control is None:
+            step, name = noise.hold, "noise.hold"
+        else:
+            return interval
+        if not is_multiple(interval / step):
+            raise ValueError(f"needs a whole multiple of {name}, {step:g} s; got {interval:g} s")
         return interval
 
     def to_yaml(self) -> str:

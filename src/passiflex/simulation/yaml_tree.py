@@ -12,6 +12,7 @@ from passiflex.simulation.quantity import shown
 
 MAX_NODES = 100_000
 MAX_DEPTH = 30
+A_SCENARIO = "a scenario needs at least name, robot, posture, law and duration"
 
 Place = tuple[str | int, ...]
 """Where a value is: the names and indices that lead to it."""
@@ -46,8 +47,8 @@ class Tree:
         self.values: dict[Place, Mark] = {}
         self.mistakes: list[tuple[Mark, str, str]] = []
 
-    def read(self, text: str) -> dict[str, Any]:
-        """Return the mapping of the text; raise RefusedText where there is none."""
+    def read(self, text: str, needs: str = A_SCENARIO) -> dict[str, Any]:
+        """Return the mapping of the text; raise RefusedText where there is none, which says what one needs."""
         try:
             node = yaml.compose(text, yaml.BaseLoader)
         except yaml.reader.ReaderError as error:
@@ -64,7 +65,7 @@ class Tree:
         except (yaml.YAMLError, ValueError, OverflowError) as error:
             raise RefusedText(f"no YAML: {_one_line(str(error))}") from None
         if node is None:
-            raise RefusedText("empty; a scenario needs at least name, robot, posture, law and duration")
+            raise RefusedText(f"empty; {needs}")
         if not isinstance(node, yaml.MappingNode):
             mark = _mark(node)
             raise RefusedText(f"line {mark.line}, column {mark.column}: not a mapping; try 'name: ...'")

@@ -1,0 +1,165 @@
+"""What the models of a file refused: each mistake at its place in the file, in words, with the nearest name."""
+
+from __future__ import annotations
+
+import re
+import typing
+from collections.abc import Iterable, Iterator
+from typing import Any, Literal, NamedTuple
+
+from pydantic import BaseModel, ValidationError
+from pydantic.fields import FieldInfo
+
+from passiflex.errors import nearest
+from passiflex.simulation.quantity import shown
+from passiflex.simulation.section import Mistakes
+from passiflex.simulation.yaml_tree import Place
+
+REFUSED_NAME = "refused_name"
+"""Type of a PydanticCustomError that is about the name of an entry, not about its value."""
+
+Model = type[BaseModel]
+
+
+def explained(error: ValidationError, data: Any, root: Model) -> Iterator[tuple[Place, str, bool]]:
+    """Yield place in the file, message, and whether it is about the key, for each mistake in `data`.
+
+    Parameters
+    ----------
+    error: What the validation of `data` by `root` raised.
+    """
+    errors = error.errors(include_url=False)
+    unknown = [e["loc"] for e in errors if e["type"] == "extra_forbidden"]
+    misspelt = {(*loc[:-1], *nearest(str(loc[-1]), _names(loc[:-1], root))[:1]) for loc in unknown}
+    for e in errors:
+        if e["type"] == "missing" and e["loc"] in misspelt:
+            continue  # its name is there, with a mistake that is reported
+        kind, ctx = e["type"], e.get("ctx", {})
+        place = _in_file(e["loc"], data, root)
+        names = _names(e["loc"][:-1] if kind in ("extra_forbidden", "missing") else e["loc"], root)
+        if kind == "default_factory_not_called":
+            continue
+        if kind == "value_error" and isinstance(ctx["error"], Mistakes):
+            for below, message in ctx["error"].entries:
+                yield (*place, *below), message, False
+        elif kind == "value_error":
+            yield place, str(ctx["error"]), False
+        elif kind == REFUSED_NAME:
+            yield place, e["msg"], True
+        elif kind == "extra_forbidden":
+            yield place, f"unknown name; {suggested(str(place[-1]), names)}", True
+        elif kind == "missing":
+            yield place, f"missing: {names[str(e['loc'][-1])]}", True
+        elif kind.startswith("union_tag") and e["input"].get(tag := ctx["discriminator"].strip("'")) is None:
+            tags = [_tag(m) for m in _reached(e["loc"], root)]
+            yield (*place, tag), f"missing: one of {', '.join(map(repr, tags))}", True
+        elif kind == "union_tag_invalid":
+            yield (*place, tag), word(ctx["tag"], re.findall(r"'([^']*)'", ctx["expected_tags"])), False
+        elif kind == "literal_error":
+            yield place, word(e["input"], re.findall(r"'([^']*)'", ctx["expected"])), False
+        elif kind in ("model_type", "model_attributes_type", "dict_type"):
+            needs = f"a mapping with {', '.join(names)}" if names else "a mapping"
+            yield place, f"expected {needs}; got {shown(e['input'])}", False
+        elif kind == "tuple_type":
+            yield place, f"expected a list; got {shown(e['input'])}", False
+        elif kind.startswith("int") or kind == "greater_than_equal":
+            least = _least(e["loc"], root)
+            yield place, f"expected a whole number, ≥ {least}; got {shown(e['input'])}", False
+        elif kind == "string_type":
+            yield place, f"expected text; got {shown(e['input'])}; try quotes around it", False
+        elif kind == "string_pattern_mismatch":
+            yield place, f"expected letters, digits, and any of _ . -; got {shown(e['input'])}", False
+        else:
+            yield place, f"{e['msg'][0].lower()}{e['msg'][1:]}; got {shown(e['input'])}", False
+
+
+def suggested(got: str, known: Iterable[str]) -> str:
+    """Return what to take in place of a wrong word: the nearest one, or any."""
+    best = nearest(got, known)[:1]
+    return f"try {best[0]!r}" if best else f"one of {', '.join(map(repr, known))}"
+
+
+def word(got: Any, known: Iterable[str]) -> str:
+    """Return what is wrong with a word that is none of those known."""
+    return f"unknown word {shown(got)}; {suggested(str(got), known)}"
+
+
+def fields(model: Model) -> dict[str, FieldInfo]:
+    """Return the fields of a model by the names that they have in a file."""
+    return {f.alias or name: f for name, f in model.model_fields.items()}
+
+
+def models(annotation: Any) -> Iterator[Model]:
+    """Yield the models that an annotation mentions."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        yield annotation
+    for part in typing.get_args(annotation):
+        yield from models(part)
+
+
+def tag_field(model: Model) -> str | None:
+    """Return the name of the entry whose only word chooses a model among the branches of its union."""
+    for name, field in fields(model).items():
+        if typing.get_origin(field.annotation) is Literal and len(typing.get_args(field.annotation)) == 1:
+            return name
+    return None
+
+
+def _tag(model: Model) -> str:
+    name = tag_field(model)
+    return str(typing.get_args(fields(model)[name].annotation)[0]) if name else ""
+
+
+class _Reached(NamedTuple):
+    """The models at a place: several where a union has not been decided; or the entries of a list or mapping."""
+
+    models: tuple[Model, ...]
+    entries: bool = False
+
+
+def _steps(loc: Place, root: Model) -> Iterator[tuple[bool, _Reached]]:
+    """Yield for each part of a place in the models whether the file has it too, and what it leads to."""
+    here = _Reached((root,))
+    for part in loc:
+        in_file = here.entries or len(here.models) < 2
+        if here.entries:
+            here = _Reached(here.models)
+        elif not in_file:
+            here = _Reached(tuple(m for m in here.models if part == _tag(m)))
+        else:
+            field = {k: f for m in here.models for k, f in fields(m).items()}.get(str(part))
+            annotation = field.annotation if field else None
+            here = _Reached(tuple(models(annotation)), typing.get_origin(annotation) in (tuple, dict))
+        yield in_file, here
+
+
+def _in_file(loc: Place, data: Any, root: Model) -> Place:
+    """Return the place in the file of a place in the models, without the names of union branches."""
+    out: list[str | int] = []
+    for part, (in_file, _) in zip(loc, _steps(loc, root), strict=True):
+        inserted = part == "value" and not (isinstance(data, dict) and "value" in data)
+        if not in_file or inserted:
+            continue
+        out.append(part)
+        inside = part in data if isinstance(data, dict) else isinstance(data, list)
+        data = data[part] if inside else None
+    return tuple(out)
+
+
+def _reached(loc: Place, root: Model) -> tuple[Model, ...]:
+    """Return the models at a place in the models: none where a list or a mapping of entries is."""
+    here = _Reached((root,))
+    for _, here in _steps(loc, root):  # noqa: B007 - the last one counts
+        pass
+    return () if here.entries else here.models
+
+
+def _least(loc: Place, root: Model) -> int:
+    """Return the least whole number that a field takes."""
+    found = [f for m in _reached(loc[:-1], root) for name, f in fields(m).items() if name == loc[-1]]
+    return next((int(b.ge) for f in found for b in f.metadata if hasattr(b, "ge")), 0)
+
+
+def _names(loc: Place, root: Model) -> dict[str, str]:
+    """Return the names that a mapping may have, each with its description."""
+    return {name: f.description or "" for m in _reached(loc, root) for name, f in fields(m).items()}

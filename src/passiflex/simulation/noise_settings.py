@@ -1,0 +1,32 @@
+"""The settings of the noise in a scenario, and whether its hold fits the rate at which sensors are read."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field
+
+from passiflex.simulation.quantity import Quantity
+from passiflex.simulation.section import Mistakes, Section
+
+
+class Noise(Section):
+    """White noise on the measured joint torque, held between samples."""
+
+    torque_variance: Annotated[float, Quantity("(N m)^2", least=0)] = Field(
+        description="variance per joint, (N m)^2"
+    )
+    hold: Annotated[float, Quantity("s", above=0)] = Field(
+        default=0.001, description="time between two samples, s; with control a whole multiple of the period"
+    )
+
+    def require(self, rate: float) -> None:
+        """Raise Mistakes unless a sample is held for whole periods of this rate [Hz]."""
+        if not is_multiple(self.hold * rate):
+            needs = f"a whole multiple of the control period, {1 / rate:g} s: sensors are read once in it"
+            raise Mistakes((("hold",), f"needs {needs}; got {self.hold:g} s"))
+
+
+def is_multiple(ratio: float) -> bool:
+    """Return whether a ratio of two times is whole, but for rounding, and at least 1."""
+    return 0.5 < ratio < 1e9 and abs(ratio - round(ratio)) <= 1e-9 * ratio
