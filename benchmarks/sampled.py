@@ -34,7 +34,7 @@ def in_machine(problem: Problem, seconds: float) -> None:
     s, compiled = problem.sampling, compiled_of(problem)
     assert s is not None
     loop = HeldLoop(compiled.loop.plant.rhs, compiled.loop.control)
-    rows, timing = Rows(problem, compiled.loop, compiled.reference).take(0, round(seconds / s.period))
+    rows, timing = Rows(problem, compiled.loop.period, compiled.row).take(0, round(seconds / s.period))
     longest = longest_step(problem, compiled.plant)
     loop.advance(start(problem, compiled), rows, timing, s.plant, s.numbers, s.period, longest)
 
@@ -44,7 +44,7 @@ def compiled_from_python(problem: Problem, seconds: float) -> None:
     s, compiled = problem.sampling, compiled_of(problem)
     assert s is not None
     count = round(seconds / s.period)
-    rows, _ = Rows(problem, compiled.loop, compiled.reference).take(0, count)
+    rows, _ = Rows(problem, compiled.loop.period, compiled.row).take(0, count)
     steps = int(np.ceil(s.period / longest_step(problem, compiled.plant)))
     h, state = s.period / steps, start(problem, compiled)
     x, memory, held = state.x, state.controller, s.held
@@ -113,7 +113,7 @@ def main() -> None:
 
 def _point(problem: Problem, compiled: CompiledSampledLoop) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     state = start(problem, compiled)
-    rows, _ = Rows(problem, compiled.loop, compiled.reference).take(0, 1)
+    rows, _ = Rows(problem, compiled.loop.period, compiled.row).take(0, 1)
     return state.x, state.controller, rows[0]
 
 

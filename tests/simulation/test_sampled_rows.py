@@ -28,7 +28,7 @@ def told(*pieces: int, **changes: Any) -> tuple[np.ndarray, np.ndarray, np.ndarr
     problem = resolve(world(**NOISE | changes))
     assert problem.sampling is not None
     compiled = compiled_sampled_loop(problem.sampling.controller)
-    rows, first = Rows(problem, compiled.loop, compiled.reference), 0
+    rows, first = Rows(problem, compiled.loop.period, compiled.row), 0
     said, timing, at = [], [], compiled.loop.row.slices
     for count in pieces:
         row, when = rows.take(first, count)

@@ -67,7 +67,7 @@ class CompiledSampledLoop:
     ----------
     loop: The symbolic loop.
     held: The loop through time.
-    plant, control, outputs, reference: Its functions, for arrays.
+    plant, control, outputs, row: Its functions, for arrays.
     """
 
     loop: SampledLoop
@@ -75,24 +75,29 @@ class CompiledSampledLoop:
     plant: NativeFunction
     control: NativeFunction
     outputs: NativeFunction
-    reference: NativeFunction
+    row: NativeFunction
 
 
 def compiled_sampled_loop(controller: SampledController) -> CompiledSampledLoop:
     """Return the compiled sampled loop of a controller; from the process, the cache on disk, or compiled now."""
-    law = controller.law
-    key = (
-        law.robot.arm.chain.to_urdf(), type(law), law.task, law.gravity,
-        type(controller.tank), controller.external, controller.inner,
-    )  # fmt: skip
+    key = structure(controller)
     if key not in _built_sampled:
         loop = SampledLoop(controller)
-        functions = [loop.plant.rhs, loop.control, loop.outputs, loop.reference]
+        functions = [loop.plant.rhs, loop.control, loop.outputs, loop.period.function]
         library = compile_functions(functions, driver=HELD_LOOP_DRIVER)
         native = [NativeFunction(f, library) for f in functions]
         held = HeldLoop(loop.plant.rhs, loop.control, library)
         _built_sampled[key] = CompiledSampledLoop(loop, held, *native)
     return _built_sampled[key]
+
+
+def structure(controller: SampledController) -> tuple[object, ...]:
+    """Return what the code of a sampled loop depends on; controllers that agree in it share compiled code."""
+    law = controller.law
+    return (
+        law.robot.arm.chain.to_urdf(), type(law), law.task, law.gravity,
+        type(controller.tank), controller.external, controller.inner,
+    )  # fmt: skip
 
 
 def _compile(loop: ClosedLoop) -> CompiledLoop:

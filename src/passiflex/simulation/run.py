@@ -96,6 +96,11 @@ class Run:
         return bool(self.data.attrs["control_period"])
 
     @property
+    def has_tank(self) -> bool:
+        """Return whether the law has a tank."""
+        return bool(self.data.attrs["has_tank"])
+
+    @property
     def failure(self) -> str:
         """Return why the run ended early; empty if it did not."""
         return str(self.data.attrs["failure"])

@@ -16,7 +16,7 @@ from passiflex.sampled.controller import SampledController
 from passiflex.sampled.motors import limit_layout, limited
 from passiflex.sampled.sensors import Sensors
 from passiflex.sampled.signals import ControlParameters, Wish
-from passiflex.simulation.motion import MOTION, reference_at
+from passiflex.simulation.period_row import PeriodRow
 from passiflex.simulation.plant import PLANT_ENERGIES, SURROUNDINGS, Plant
 
 
@@ -40,7 +40,7 @@ class SampledLoop:
     """Plant and controller as functions of flat vectors, ready for code generation.
 
     `plant.rhs` is the plant; `control` is (x, c, row, p) → (c, command, signals), one period; `outputs` is
-    (x, command, surroundings, p) → what is true then; `reference` is (clock, motion) → pose and derivatives.
+    (x, command, surroundings, p) → what is true then; `period` makes the rows.
     """
 
     controller: SampledController
@@ -71,22 +71,14 @@ class SampledLoop:
         return self.sensors.state + self.controller.state + torque
 
     @cached_property
+    def period(self) -> PeriodRow:
+        """Return how the row of a period comes about."""
+        return PeriodRow(self.controller.law.robot.n, self.controller.law.task.size)
+
+    @property
     def row(self) -> Layout:
         """Return what is told anew in every period; the surroundings come first."""
-        n, k = self.controller.law.robot.n, self.controller.law.task.size
-        return SURROUNDINGS + Layout(
-            (
-                Field("desired_position", (3,), "m", "x_d"),
-                Field("desired_rotation", (3, 3), "1", "axes of x_d"),
-                Field("desired_velocity", (6,), "m/s, rad/s", "ẋ_d"),
-                Field("desired_acceleration", (6,), "m/s^2, rad/s^2", "ẍ_d"),
-                Field("desired_stiffness", (k, k), "N/m, N, N m/rad", "K_x"),
-                Field("desired_damping", (k, k), "N s/m, N s, N m s/rad", "D_x"),
-                Field("feedforward", (6,), "N, N m", "wrench that the end effector is to exert"),
-                Field("torque_noise", (n,), "N m", "of the joint torque sensors"),
-                Field("elapsed", (), "s", "since the last period that ran"),
-            )
-        )
+        return self.period.layout
 
     @cached_property
     def signals(self) -> Layout:
@@ -222,16 +214,6 @@ class SampledLoop:
         return cs.Function(
             "truth", [state, command, surroundings, p], [cs.densify(cs.vertcat(known, powers))], {"cse": True}
         )
-
-    @cached_property
-    def reference(self) -> cs.Function:
-        """Return (clock, motion) → (position, rotation by rows, ẋ_d, ẍ_d) as one column."""
-        clock = cs.SX.sym("clock")
-        motion, c = MOTION.symbols("motion")
-        r = reference_at(clock, cs.SX(1), c)
-        acceleration = cs.jacobian(r.velocity, clock)
-        rows = cs.vertcat(r.pose.position, cs.vec(r.pose.rotation.T), r.velocity, acceleration)
-        return cs.Function("reference", [clock, motion], [cs.densify(rows)], {"cse": True})
 
 
 def _views(parts: Parts, p: cs.SX) -> SimpleNamespace:

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from passiflex.errors import SimulationError
-from passiflex.layout import Field, Layout
 from passiflex.native import LoopState, NativeFunction, fastest_pole
 from passiflex.native.fixed_step import STABILITY_LIMIT
 from passiflex.simulation.admissible import require_stable
 from passiflex.simulation.compiled import CompiledSampledLoop, compiled_sampled_loop
-from passiflex.simulation.plant import PLANT_ENERGIES
-from passiflex.simulation.problem import Problem, Sampling
+from passiflex.simulation.plant import SURROUNDINGS
+from passiflex.simulation.problem import Problem
+from passiflex.simulation.recorded import reported, sample_parts
 from passiflex.simulation.rows import NOW
 from passiflex.simulation.rows import Rows as PeriodRows
 from passiflex.simulation.run import Rows, Run, assemble
@@ -27,24 +27,6 @@ PIECE = 8192
 """Periods that are made ready at a time; it bounds the memory, whatever the length of a run."""
 MOST_STEPS = 200_000_000
 """Steps of one run at most, about two minutes."""
-INTERNAL = (
-    "started", "read_q", "read_theta", "read_dq", "read_dtheta", "read_tau_a", "read_wrench", "last_q",
-    "last_tau_a", "last_command", "running", "given_torque", "claimed_power", "claimed_cartesian_power",
-    "variable_potential", "seen", "seen_theta", "seen_deflection", "seen_dq", "seen_ddq", "in_flight",
-    "momentum", "known_torque", "observing", "lost_time",
-)  # fmt: skip
-"""Memory of the controller that is of no interest to a reader, or is recorded under another name."""
-
-
-class _Recorded(NamedTuple):
-    """Rows of the result."""
-
-    x: Array
-    quads: Array
-    memory: Array
-    command: Array
-    signals: Array
-    rows: Array
 
 
 def simulate_sampled(problem: Problem) -> Run:
@@ -57,10 +39,14 @@ def simulate_sampled(problem: Problem) -> Run:
     UnstableLoopError
         If the loop is unstable at its rate and delay, and the scenario does not insist.
     """
-    assert problem.sampling is not None
     require_stable(problem)
-    compiled = compiled_sampled_loop(problem.sampling.controller)
-    return _record(problem, compiled)
+    return simulate_unchecked(problem)
+
+
+def simulate_unchecked(problem: Problem) -> Run:
+    """Return the run of a sampled problem, stable or not."""
+    assert problem.sampling is not None
+    return _record(problem, compiled_sampled_loop(problem.sampling.controller))
 
 
 def start(problem: Problem, compiled: CompiledSampledLoop) -> LoopState:
@@ -100,20 +86,29 @@ def longest_step(problem: Problem, plant: NativeFunction) -> float:
     return longest
 
 
+def sample_count(problem: Problem) -> int:
+    """Return the number of samples of a whole run, the first and the last included."""
+    s = problem.sampling
+    assert s is not None
+    periods = problem.duration / s.period
+    whole = abs(periods - round(periods)) < NOW / s.period
+    return (round(periods) if whole else int(periods)) + 1
+
+
+def left_finite(time: float) -> str:
+    """Return how a run says that it left the finite numbers at a time [s]."""
+    return f"the state left the finite numbers {time:.4g} s after the start"
+
+
 def _record(problem: Problem, compiled: CompiledSampledLoop) -> Run:
     s, loop, held = problem.sampling, compiled.loop, compiled.held
     assert s is not None
     state = start(problem, compiled)
     longest = longest_step(problem, compiled.plant)
-    periods = (
-        round(problem.duration / s.period)
-        if _whole(problem.duration, s)
-        else int(problem.duration / s.period)
-    )
     every = round(problem.output_interval / s.period)
-    rows = PeriodRows(problem, loop, compiled.reference)
-    pieces: list[_Recorded] = []
-    samples, failure = periods + 1, ""
+    rows = PeriodRows(problem, loop.period, compiled.row)
+    pieces: list[list[Array]] = []
+    samples, failure = sample_count(problem), ""
     piece = max(1, PIECE // every) * every
     for first in range(0, samples, piece):
         count = min(piece, samples - first)
@@ -122,52 +117,26 @@ def _record(problem: Problem, compiled: CompiledSampledLoop) -> Run:
             state, told, timing, s.plant, s.numbers, s.period, longest, every, last=first + count == samples
         )
         state = done.state
-        pieces.append(
-            _Recorded(done.x, done.quads, done.controller, done.command, done.signals, told[::every])
-        )
+        good = done.completed // every + 1 if done.completed < count else None
+        seen = (done.x, done.quads, done.controller, done.command, done.signals, told[::every])
+        pieces.append([part[:good] for part in seen])
         if done.completed < count:
-            failure = f"the state left the finite numbers {(first + done.completed) * s.period:.4g} s after the start"
+            failure = left_finite((first + done.completed) * s.period)
             break
-    all_rows = _Recorded(*(np.vstack(part) for part in zip(*pieces, strict=True)))
-    good = np.isfinite(all_rows.x).all(axis=1) & np.isfinite(all_rows.quads).all(axis=1)
-    kept = _Recorded(*(part[: int(np.argmin(good)) if not good.all() else None] for part in all_rows))
-    return _assemble(problem, compiled, kept, every, failure)
+    return _assemble(problem, compiled, [np.vstack(part) for part in zip(*pieces, strict=True)], failure)
 
 
-def _whole(duration: float, s: Sampling) -> bool:
-    return abs(duration / s.period - round(duration / s.period)) < NOW / s.period
-
-
-def _assemble(problem: Problem, compiled: CompiledSampledLoop, r: _Recorded, every: int, failure: str) -> Run:
-    loop, s = compiled.loop, problem.sampling
+def _assemble(problem: Problem, compiled: CompiledSampledLoop, seen: list[Array], failure: str) -> Run:
+    s, parts = problem.sampling, sample_parts(compiled.loop)
     assert s is not None
-    names = [f.name for f in loop.row]
-    felt = slice(0, loop.row.slices["desired_position"].start)
-    truth = np.asarray(compiled.outputs.map(r.x, r.command, r.rows[:, felt], s.numbers), dtype=float)
-    n = problem.law.robot.n
-    state = Layout(
-        (
-            Field("q", (n,), "rad", "link position"),
-            Field("theta", (n,), "rad", "motor position"),
-            Field("dq", (n,), "rad/s", "link velocity"),
-            Field("dtheta", (n,), "rad/s", "motor velocity"),
-        )
-    )
-    motors = Layout((Field("tau_m", (n,), "N m", "motor torque in force"),))
-    wished = Layout(tuple(f for f in loop.row if f.name in ("desired_position", "desired_rotation")))
-    first = names.index("desired_position")
-    assert names[first + 1] == "desired_rotation"
-    kept = Layout(tuple(f for f in loop.memory if f.name not in INTERNAL))
-    columns = np.hstack([np.arange(loop.memory.size)[loop.memory.slices[f.name]] for f in kept])
-    begin = loop.row.slices["desired_position"].start
-    recorded = [
-        Rows(state, r.x),
-        Rows(PLANT_ENERGIES, r.quads, "_energy"),
-        Rows(kept, r.memory[:, columns]),
-        Rows(motors, r.command),
-        Rows(loop.signals, r.signals),
-        Rows(loop.truth, truth),
-        Rows(wished, r.rows[:, begin : begin + wished.size]),
-    ]
-    time: Array = np.arange(len(r.x), dtype=np.float64) * (s.period * every)
+    x, _, _, command, _, rows = seen
+    felt = slice(0, SURROUNDINGS.size)
+    truth = np.asarray(compiled.outputs.map(x, command, rows[:, felt], s.numbers), dtype=float)
+    recorded = []
+    for (name, layout), numbers in zip(parts.items(), [*seen[:-1], truth, rows], strict=True):
+        kept = reported(name, layout)
+        columns = np.hstack([np.arange(layout.size)[layout.slices[f.name]] for f in kept])
+        recorded.append(Rows(kept, numbers[:, columns]))
+    every = round(problem.output_interval / s.period)
+    time: Array = np.arange(len(x), dtype=np.float64) * (s.period * every)
     return assemble(problem, time, recorded, [], failure)
