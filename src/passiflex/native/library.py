@@ -52,14 +52,26 @@ def compile_functions(functions: Sequence[cs.Function], *, driver: str = "") -> 
         If the compiler fails, or the library does not load.
     """
     _check_names([f.name() for f in functions])
-    compiler = find_compiler()
-    if compiler is None:
+    if find_compiler() is None:
         _warn_once(
             "no C compiler: functions run in CasADi's virtual machine, about 30 times slower; "
             "install a C compiler (gcc or clang) or the extra passiflex[zig]"
         )
         return None
-    source = generate(functions, driver)
+    return compile_source(generate(functions, driver))
+
+
+def compile_source(source: str) -> Path:
+    """Return a shared library of a C text, from the cache or compiled now.
+
+    Raises
+    ------
+    CompilerError
+        If there is no compiler, it fails, or the library does not load.
+    """
+    compiler = find_compiler()
+    if compiler is None:
+        raise CompilerError("no C compiler", needs="gcc, clang, or the extra passiflex[zig]")
     path = cache_folder() / (_key(source, compiler) + SUFFIX)
     if _loads(path):
         return path

@@ -1,0 +1,172 @@
+/* The loop of held_loop.c for several robots side by side, each in its own lane.
+ *
+ * The text before this one defines, for lanes, the generated functions and their sizes:
+ *   PLANT(x, [command, surroundings], p) -> (dx, dquad)      CONTROL(x, c, row, p) -> (c, command, z)
+ *   ROW(time, told, drawn) -> row                            TRUTH(x, command, surroundings, p) -> truth
+ * What is told to a lane changes at single periods (changes, in the order of periods: period, lane, and where
+ * in told_values its numbers stand); drawn are the numbers that chance gives to each period. timing holds for
+ * each period and lane the delay of the command and whether the controller runs. Each lane keeps its own line
+ * of commands on their way, its own longest step, and steps from arrival to arrival just as it would alone;
+ * a lane that has finished its period waits for the others.
+ * out receives, at every record_every-th sample, the numbers `kept` of (x, quad, c, command in force, z,
+ * truth, row). Nothing is allocated here. A lane whose y leaves the finite numbers goes on as it is, and
+ * disturbs no other; completed[lane] is the sample at which that happened, else n_rows. */
+typedef struct {
+    long long first, n_rows, steps, record_every, n_changes, n_kept;
+    double period;
+    lanes *y, *c, *told, *z;
+    double *line, *longest;
+    const long long* changes;
+    const double* told_values;
+    const lanes* drawn;
+    const double* timing;
+    const lanes *p_plant, *p_control;
+    const long long* kept;
+    lanes* out;
+    long long* completed;
+} passiflex_lane_run;
+
+enum { N_Y = N_X + N_Q, ENTRY = 1 + N_U, LINE = 1 + N_U + LONGEST_LINE * ENTRY };
+
+/* One lane's way through a period: where it is, and the equal steps to the next arrival. */
+typedef struct {
+    double t, h, until;
+    long long left;
+    int arrived; /* at the end of the period */
+} lane_clock;
+
+static void lane_step(lanes* y, const lanes* input, const lanes* p, lanes h, lane_bits moving)
+{
+    static const double node[4] = {0.0, 0.5, 0.5, 1.0};
+    static const double weight[4] = {1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0};
+    lanes stage[N_X], slope[N_Y], sum[N_Y];
+    for (int i = 0; i < N_Y; i++) sum[i] = all_lanes(0.0);
+    for (int s = 0; s < 4; s++) {
+        for (int i = 0; i < N_X; i++) stage[i] = s ? y[i] + h * node[s] * slope[i] : y[i];
+        PLANT(stage, input, p, slope, slope + N_X);
+        for (int i = 0; i < N_Y; i++) sum[i] += weight[s] * slope[i];
+    }
+    for (int i = 0; i < N_Y; i++) y[i] = where(moving, y[i] + h * sum[i], y[i]);
+}
+
+/* Put a lane's newest command into its line. */
+static void lane_send(double* line, const lanes* command, int l, double delay)
+{
+    double* queue = line + 1 + N_U;
+    const long long waiting = (long long)line[0];
+    double* last = queue + waiting * ENTRY;
+    last[0] = waiting && last[-ENTRY] > delay ? last[-ENTRY] : delay;
+    for (int i = 0; i < N_U; i++) last[1 + i] = LANE(command[i], l);
+    line[0] = (double)(waiting + 1);
+}
+
+/* Take what has arrived by now, and write the command in force into the lane. */
+static void lane_receive(double* line, lanes* held, int l, double now, double period)
+{
+    double* queue = line + 1 + N_U;
+    long long waiting = (long long)line[0];
+    while (waiting && queue[0] <= now + 1e-9 * period) {
+        memcpy(line + 1, queue + 1, N_U * sizeof(double));
+        waiting--;
+        memmove(queue, queue + ENTRY, waiting * ENTRY * sizeof(double));
+    }
+    line[0] = (double)waiting;
+    for (int i = 0; i < N_U; i++) LANE(held[i], l) = line[1 + i];
+}
+
+/* Plan the equal steps to a lane's next arrival, or to the end of its period. */
+static void lane_plan(lane_clock* clock, const double* line, double period, double longest)
+{
+    const double next = line[1 + N_U];
+    clock->until = line[0] != 0.0 && next < period ? next : period;
+    clock->left = (long long)ceil((clock->until - clock->t) / longest * (1.0 - 1e-12));
+    if (clock->left < 1) clock->left = 1;
+    clock->h = (clock->until - clock->t) / clock->left;
+}
+
+static void lane_period(const passiflex_lane_run* r, lanes* input)
+{
+    lane_clock clock[LANES];
+    EACH_LANE
+    {
+        clock[l] = (lane_clock){0.0, 0.0, 0.0, 0, 0};
+        lane_plan(&clock[l], r->line + l * LINE, r->period, r->longest[l]);
+    }
+    for (;;) {
+        lanes h = all_lanes(0.0);
+        lane_bits moving = all_bits(0);
+        int some = 0;
+        EACH_LANE if (!clock[l].arrived)
+        {
+            LANE(h, l) = clock[l].h;
+            LANE(moving, l) = -1;
+            some = 1;
+        }
+        if (!some) return;
+        lane_step(r->y, input, r->p_plant, h, moving);
+        EACH_LANE if (!clock[l].arrived && --clock[l].left == 0)
+        {
+            double* line = r->line + l * LINE;
+            clock[l].t = clock[l].until;
+            if (clock[l].t >= r->period) {
+                clock[l].arrived = 1;
+            } else {
+                lane_receive(line, input, l, clock[l].t, r->period);
+                lane_plan(&clock[l], line, r->period, r->longest[l]);
+            }
+        }
+    }
+}
+
+LANE_EXPORT int passiflex_lanes(void) { return LANES; }
+
+LANE_EXPORT void passiflex_lane_loop(const passiflex_lane_run* r)
+{
+    lanes next[N_C], command[N_U], said[N_Z], row[N_W], time, input[N_U + N_S];
+    lanes seen[N_Y + N_C + N_U + N_Z + N_TRUTH + N_W];
+    const long long* change = r->changes;
+    lanes* out = r->out;
+    EACH_LANE r->completed[l] = r->n_rows;
+    for (long long k = 0; k < r->n_rows; k++) {
+        const double* timing = r->timing + k * 2 * LANES;
+        lane_bits runs;
+        for (; change < r->changes + 3 * r->n_changes && change[0] <= r->first + k; change += 3)
+            for (int i = 0; i < N_TOLD; i++) LANE(r->told[i], change[1]) = r->told_values[change[2] * N_TOLD + i];
+        time = all_lanes((double)(r->first + k) * r->period);
+        ROW(&time, r->told, r->drawn + k * N_DRAWN, row);
+        CONTROL(r->y, r->c, row, r->p_control, next, command, said);
+        EACH_LANE LANE(runs, l) = timing[LANES + l] != 0.0 ? -1 : 0;
+        for (int i = 0; i < N_C; i++) r->c[i] = where(runs, next[i], r->c[i]);
+        for (int i = 0; i < N_Z; i++) r->z[i] = where(runs, said[i], r->z[i]);
+        for (int i = 0; i < N_S; i++) input[N_U + i] = row[i];
+        EACH_LANE
+        {
+            if (timing[LANES + l] != 0.0) lane_send(r->line + l * LINE, command, l, timing[l]);
+            lane_receive(r->line + l * LINE, input, l, 0.0, r->period);
+        }
+        if (k % r->record_every == 0) {
+            lanes* s = seen;
+            memcpy(s, r->y, N_Y * sizeof(lanes)), s += N_Y;
+            memcpy(s, r->c, N_C * sizeof(lanes)), s += N_C;
+            memcpy(s, input, N_U * sizeof(lanes)), s += N_U;
+            memcpy(s, r->z, N_Z * sizeof(lanes)), s += N_Z;
+            TRUTH(r->y, input, row, r->p_control, s), s += N_TRUTH;
+            memcpy(s, row, N_W * sizeof(lanes));
+            for (long long i = 0; i < r->n_kept; i++) *out++ = seen[r->kept[i]];
+        }
+        if (k >= r->steps) break;
+        lane_period(r, input);
+        int alive = 0;
+        EACH_LANE
+        {
+            double* line = r->line + l * LINE;
+            for (long long i = 0; i < (long long)line[0]; i++) line[1 + N_U + i * ENTRY] -= r->period;
+            if (r->completed[l] < r->n_rows) continue;
+            int finite = 1;
+            for (int i = 0; i < N_Y; i++) finite &= isfinite(LANE(r->y[i], l)) != 0;
+            if (!finite) r->completed[l] = k;
+            alive |= finite;
+        }
+        if (!alive) return;
+    }
+}

@@ -1,0 +1,244 @@
+"""A sampled loop for several robots side by side in native code, each in a lane of its own."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import casadi as cs
+import numpy as np
+from numpy.typing import NDArray
+
+from passiflex.errors import SizeError
+from passiflex.native.entry import address
+from passiflex.native.held_loop import LONGEST_LINE, LoopState
+from passiflex.native.lane_source import lane_source
+from passiflex.native.library import c_source, compile_source
+
+Array = NDArray[np.float64]
+
+
+class Change(NamedTuple):
+    """From this period on, a lane is told these numbers."""
+
+    period: int
+    lane: int
+    told: Array
+
+
+class LaneState(NamedTuple):
+    """Everything that goes from one call to the next; the last axis of all but `line` is the lane.
+
+    Attributes
+    ----------
+    y: States of the plants and their quadratures.
+    controller, signals: As of `LoopState`.
+    line: Commands on their way, a row for each lane.
+    told: What was told last.
+    """
+
+    y: Array
+    controller: Array
+    signals: Array
+    line: Array
+    told: Array
+
+
+class LaneSamples(NamedTuple):
+    """Recorded samples (rows, kept, lanes), how many samples each lane did while it was finite, the state after."""
+
+    values: Array
+    completed: NDArray[np.int64]
+    state: LaneState
+
+
+class LaneInputs(NamedTuple):
+    """What drives the lanes through one stretch of N periods; the last axis is the lane.
+
+    Attributes
+    ----------
+    first: Number of its first period.
+    changes: What is told anew in it, by period.
+    drawn: Numbers of chance (N, n_drawn, lanes).
+    timing: Delay of each command [s] ≥ 0, and whether the controller runs (N, 2, lanes).
+    """
+
+    first: int
+    changes: Sequence[Change]
+    drawn: Array
+    timing: Array
+
+
+class _Run(ctypes.Structure):
+    _fields_ = (
+        *((n, ctypes.c_longlong) for n in ("first", "n_rows", "steps", "record_every", "n_changes", "n_kept")),
+        ("period", ctypes.c_double),
+        *(
+            (name, ctypes.c_void_p)
+            for name in (
+                "y", "c", "told", "z", "line", "longest", "changes", "told_values", "drawn", "timing",
+                "p_plant", "p_control", "kept", "out", "completed",
+            )
+        ),
+    )  # fmt: skip
+
+
+class LaneFunctions(NamedTuple):
+    """The four functions of a loop, all of dense columns.
+
+    Attributes
+    ----------
+    plant: (x, [command, surroundings], p) → (dx, dquad).
+    control: (x, c, row, p) → (c, command, signals); a row begins with the surroundings.
+    row: (time, told, drawn) → row.
+    truth: (x, command, surroundings, p) → what is true then, with p as for control.
+    """
+
+    plant: cs.Function
+    control: cs.Function
+    row: cs.Function
+    truth: cs.Function
+
+
+class LaneLoop:
+    """Advances as many loops as the processor has lanes. Threads may share the object.
+
+    Each lane does exactly what `HeldLoop` does, whatever the others do: the same steps from arrival to
+    arrival. Its results differ from `HeldLoop`'s by rounding only (where the compiler joins products and
+    sums, sin, cos, exp and tanh of `lanes.h`, shared divisors), and not at all with lane or neighbours.
+
+    Parameters
+    ----------
+    functions: The loop.
+    width: Number of lanes; what the processor has (8, 4 or 1) if None.
+
+    Raises
+    ------
+    CompilerError
+        If there is no compiler.
+    """
+
+    def __init__(self, functions: LaneFunctions, width: int | None = None):
+        f = functions
+        self.n_x, self.n_q = f.plant.size1_out(0), f.plant.size1_out(1)
+        self.n_c, self.n_u, self.n_z = (f.control.size1_out(i) for i in range(3))
+        self.n_s = f.plant.size1_in(1) - self.n_u
+        self.n_told, self.n_drawn, self.n_w = f.row.size1_in(1), f.row.size1_in(2), f.row.size1_out(0)
+        self.n_p_plant, self.n_p_control = f.plant.size1_in(2), f.control.size1_in(3)
+        self.n_truth = f.truth.size1_out(0)
+        self.n_line = 1 + self.n_u + LONGEST_LINE * (1 + self.n_u)
+        self.library = compile_source(self._source(f, width))
+        loaded = ctypes.CDLL(str(self.library))
+        self.width: int = loaded.passiflex_lanes()
+        self._routine = loaded.passiflex_lane_loop
+        self._routine.argtypes, self._routine.restype = [ctypes.c_void_p], None
+
+    @property
+    def instant(self) -> dict[str, slice]:
+        """Return where each part stands in the numbers of one sample, which `kept` of `advance` picks from."""
+        sizes = {
+            "x": self.n_x, "quads": self.n_q, "controller": self.n_c, "command": self.n_u,
+            "signals": self.n_z, "truth": self.n_truth, "row": self.n_w,
+        }  # fmt: skip
+        ends = np.cumsum(list(sizes.values())).tolist()
+        return {name: slice(end - size, end) for (name, size), end in zip(sizes.items(), ends, strict=True)}
+
+    def start(self, states: Sequence[LoopState]) -> LaneState:
+        """Return the state of lanes that begin as `HeldLoop.start` says, one for each lane.
+
+        Raises
+        ------
+        SizeError
+            For another number of states than lanes.
+        """
+        if len(states) != self.width:
+            raise SizeError("states", got=len(states), needs=f"one for each of {self.width} lanes")
+        return LaneState(
+            np.stack([np.concatenate([s.x, s.quads]) for s in states], axis=1),
+            np.stack([s.controller for s in states], axis=1),
+            np.stack([s.signals for s in states], axis=1),
+            np.stack([s.line for s in states]),
+            np.zeros((self.n_told, self.width)),
+        )
+
+    def advance(
+        self,
+        state: LaneState,
+        inputs: LaneInputs,
+        p_plant: Array,
+        p_control: Array,
+        period: float,
+        longest: Array,
+        kept: NDArray[np.int64],
+        record_every: int = 1,
+        *,
+        last: bool = False,
+    ) -> LaneSamples:
+        """Return the samples of a stretch, and the state after it.
+
+        Parameters
+        ----------
+        state: From `start`, or from the call before.
+        inputs: What drives the stretch; commands may be late by fewer than 62 periods.
+        p_plant, p_control: Parameters (n, lanes).
+        period: [s]; the same for all lanes, from `start` on.
+        longest: Longest step of the plant in each lane [s].
+        kept: Which numbers of a sample to record, see `instant`.
+        record_every: Samples from one recorded to the next.
+        last: True if the last row is a sample only, with no period after it.
+
+        Raises
+        ------
+        SizeError
+            For an argument of the wrong shape.
+        """
+        w, n = self.width, len(inputs.drawn)
+        arrays = {
+            "y": _aligned("y", state.y, (self.n_x + self.n_q, w)),
+            "c": _aligned("controller", state.controller, (self.n_c, w)),
+            "z": _aligned("signals", state.signals, (self.n_z, w)),
+            "line": _aligned("line", state.line, (w, self.n_line)),
+            "told": _aligned("told", state.told, (self.n_told, w)),
+            "drawn": _aligned("drawn", inputs.drawn, (n, self.n_drawn, w)),
+            "timing": _aligned("timing", inputs.timing, (n, 2, w)),
+            "p_plant": _aligned("p_plant", p_plant, (self.n_p_plant, w)),
+            "p_control": _aligned("p_control", p_control, (self.n_p_control, w)),
+            "longest": _aligned("longest", longest, (w,)),
+            "out": _aligned("out", None, (-(-n // record_every), kept.size, w)),
+        }
+        changes = sorted(inputs.changes, key=lambda change: change.period)
+        told = np.array([c.told for c in changes], dtype=float).reshape(len(changes), self.n_told)
+        when = np.array([(c.period, c.lane, i) for i, c in enumerate(changes)], dtype=np.int64)
+        kept = np.ascontiguousarray(kept, dtype=np.int64)
+        completed = np.zeros(w, dtype=np.int64)
+        run = _Run(
+            inputs.first, n, n - last, record_every, len(changes), kept.size, period,
+            changes=address(when), told_values=address(told), kept=address(kept),
+            completed=address(completed), **{name: address(a) for name, a in arrays.items()},
+        )  # fmt: skip
+        self._routine(ctypes.byref(run))
+        after = LaneState(*(arrays[name] for name in ("y", "c", "z", "line", "told")))
+        return LaneSamples(arrays["out"], completed, after)
+
+    def _source(self, f: LaneFunctions, width: int | None) -> str:
+        sizes = {
+            "N_X": self.n_x, "N_Q": self.n_q, "N_C": self.n_c, "N_U": self.n_u, "N_S": self.n_s,
+            "N_Z": self.n_z, "N_W": self.n_w, "N_TOLD": self.n_told, "N_DRAWN": self.n_drawn,
+            "N_TRUTH": self.n_truth, "LONGEST_LINE": LONGEST_LINE,
+        }  # fmt: skip
+        lines = [f"enum {{ {', '.join(f'{name} = {size}' for name, size in sizes.items())} }};"]
+        lines += [f"#define {part.upper()} {g.name()}_in_lanes" for part, g in f._asdict().items()]
+        return "\n".join((lane_source(f, width), *lines, c_source("lane_loop.c")))
+
+
+def _aligned(name: str, value: Array | None, shape: tuple[int, ...]) -> Array:
+    """Return a copy whose numbers start where wide registers want them; NaN for no value."""
+    if value is not None and np.shape(value) != shape:
+        raise SizeError(name, got=np.shape(value), needs=f"shape {shape}")
+    size = int(np.prod(shape))
+    room = np.empty(size + 8)
+    start = -room.ctypes.data % 64 // 8
+    copy = room[start : start + size].reshape(shape)
+    copy[...] = np.nan if value is None else value
+    return copy

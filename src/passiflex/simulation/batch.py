@@ -1,0 +1,249 @@
+"""Run many sampled problems side by side in lanes; each gives the numbers that it gives alone."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Hashable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from passiflex.errors import NameUnknownError, SimulationError
+from passiflex.native import Change, LaneFunctions, LaneInputs, LaneLoop, find_compiler
+from passiflex.simulation.compiled import CompiledSampledLoop, compiled_sampled_loop, structure
+from passiflex.simulation.problem import Problem
+from passiflex.simulation.recorded import reported, sample_parts
+from passiflex.simulation.rows import Chance, Told, orders
+from passiflex.simulation.run import Rows, Run, assemble
+from passiflex.simulation.sampled_loop import SampledLoop
+from passiflex.simulation.simulate_sampled import (
+    left_finite,
+    longest_step,
+    sample_count,
+    simulate_unchecked,
+    start,
+)
+
+Array = NDArray[np.float64]
+
+PIECE = 2048
+"""Periods that are made ready at a time."""
+
+_lane_loops: dict[tuple[Hashable, int | None], LaneLoop] = {}
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """The signals of one run that were asked for, as `Run` has them.
+
+    Attributes
+    ----------
+    signals: By name, time first.
+    time: [s].
+    failure: Why the run ended early; empty if it did not.
+    has_tank: Whether its law has a tank.
+    """
+
+    signals: dict[str, Array]
+    time: Array
+    failure: str
+    has_tank: bool
+    sampled: bool = True
+
+    def __getitem__(self, name: str) -> Array:
+        """Return a signal as an array; time is the first axis."""
+        return self.signals[name]
+
+
+def simulate_batch(
+    problems: Sequence[Problem], keep: Sequence[str], *, threads: int = 1, width: int | None = None
+) -> list[Recording]:
+    """Return the recordings of sampled problems, in their order.
+
+    Problems of the same structure and timing share the lanes of one native loop; what comes out does not
+    depend on which, nor on the number of lanes or threads. A problem whose state leaves the finite numbers
+    ends there and says so. Whether a loop is stable is not asked.
+
+    Parameters
+    ----------
+    problems: All of them with a control rate.
+    keep: Names of the signals to record, of those that a `Run` has.
+    threads: How many native loops run at a time.
+    width: Lanes of one loop; by the processor if None. Without a C compiler the problems run one by one.
+
+    Raises
+    ------
+    SimulationError
+        For a problem in continuous time.
+    NameUnknownError
+        For a signal that there is not.
+    """
+    for problem in problems:
+        if problem.sampling is None:
+            raise SimulationError(f"{problem.name!r} has no control rate", needs="`control: {rate: …}`")
+    if find_compiler() is None:
+        return [_alone(problem, keep) for problem in problems]
+    groups: defaultdict[Hashable, list[int]] = defaultdict(list)
+    steps = [longest_step(p, _compiled(p).plant) for p in problems]
+    for i, problem in enumerate(problems):
+        groups[_alike(problem)].append(i)
+    jobs = []
+    for group in groups.values():
+        loop = lane_loop(problems[group[0]], width)
+        group.sort(key=lambda i: steps[i])  # lanes that take as many steps as each other wait for none
+        jobs += [(loop, group[i : i + loop.width]) for i in range(0, len(group), loop.width)]
+
+    def run(job: tuple[LaneLoop, list[int]]) -> list[Recording]:
+        loop, members = job
+        return _advance(loop, [problems[i] for i in members], np.array([steps[i] for i in members]), keep)
+
+    with ThreadPoolExecutor(threads) as pool:
+        done = list(pool.map(run, jobs))
+    found = {
+        i: r for (_, group), part in zip(jobs, done, strict=True) for i, r in zip(group, part, strict=True)
+    }
+    return [found[i] for i in range(len(problems))]
+
+
+def lane_loop(problem: Problem, width: int | None = None) -> LaneLoop:
+    """Return the native lanes for problems of this structure; from the process, the cache on disk, or compiled now."""
+    assert problem.sampling is not None
+    key = (structure(problem.sampling.controller), width)
+    if key not in _lane_loops:
+        loop = _compiled(problem).loop
+        functions = LaneFunctions(loop.plant.rhs, loop.control, loop.period.function, loop.outputs)
+        _lane_loops[key] = LaneLoop(functions, width)
+    return _lane_loops[key]
+
+
+def _compiled(problem: Problem) -> CompiledSampledLoop:
+    assert problem.sampling is not None
+    return compiled_sampled_loop(problem.sampling.controller)
+
+
+def _alike(problem: Problem) -> Hashable:
+    """Return what problems have in common that can share lanes."""
+    s = problem.sampling
+    assert s is not None
+    return structure(s.controller), s.period, problem.duration, problem.output_interval
+
+
+def _alone(problem: Problem, keep: Sequence[str]) -> Recording:
+    run = simulate_unchecked(problem)
+    return Recording({name: run[name] for name in keep}, run.time, run.failure, run.has_tank)
+
+
+def _advance(
+    lanes: LaneLoop, problems: list[Problem], longest: Array, keep: Sequence[str]
+) -> list[Recording]:
+    """Return the recordings of at most as many problems as there are lanes; lanes left over repeat the last."""
+    filled = [*problems, *[problems[-1]] * (lanes.width - len(problems))]
+    longest = np.concatenate([longest, np.full(lanes.width - len(problems), longest[-1])])
+    compiled = _compiled(problems[0])
+    s = problems[0].sampling
+    assert s is not None
+    every = round(problems[0].output_interval / s.period)
+    columns, shapes = _columns(lanes, compiled.loop, keep)
+    numbers = [p.sampling for p in filled if p.sampling is not None]
+    p_plant = np.stack([n.plant for n in numbers], axis=1)
+    p_control = np.stack([n.numbers for n in numbers], axis=1)
+    state = lanes.start([start(p, compiled) for p in filled])
+    told = [orders(p, compiled.loop.period) for p in filled]
+    chances = [Chance(p, compiled.loop.period) for p in filled]
+    samples, piece = sample_count(problems[0]), max(1, PIECE // every) * every
+    ended = np.full(lanes.width, samples)
+    pieces = []
+    for first in range(0, samples, piece):
+        count = min(piece, samples - first)
+        drawn, timing = zip(*(chance.take(first, count) for chance in chances), strict=True)
+        inputs = LaneInputs(
+            first, _changes(told, first, first + count), np.stack(drawn, axis=-1), np.stack(timing, axis=-1)
+        )
+        done = lanes.advance(
+            state,
+            inputs,
+            p_plant,
+            p_control,
+            s.period,
+            longest,
+            columns,
+            every,
+            last=first + count == samples,
+        )
+        state = done.state
+        pieces.append(done.values)
+        left = (done.completed < count) & (ended == samples)
+        ended[left] = first + done.completed[left]
+        if (ended < samples).all():
+            break
+    values = np.concatenate(pieces).transpose(2, 0, 1)
+    return [
+        _recording(p, values[lane], shapes, int(ended[lane]), samples, every)
+        for lane, p in enumerate(problems)
+    ]
+
+
+def _changes(told: list[list[Told]], begin: int, end: int) -> list[Change]:
+    return [
+        Change(order.first, lane, order.numbers)
+        for lane, list_of in enumerate(told)
+        for order in list_of
+        if begin <= order.first < end
+    ]
+
+
+def _columns(
+    lanes: LaneLoop, loop: SampledLoop, keep: Sequence[str]
+) -> tuple[NDArray[np.int64], dict[str, tuple[slice, tuple[int, ...]]]]:
+    """Return which numbers of a sample to keep, and of what is kept where each signal stands, with its shape."""
+    where = {}
+    for part, layout in sample_parts(loop).items():
+        begin = lanes.instant[part].start
+        for f in reported(part, layout):
+            own = layout.slices[f.name]
+            where[f.name] = np.arange(begin + own.start, begin + own.stop), f.shape
+    columns, shapes, end = [], {}, 0
+    for name in keep:
+        if name not in where:
+            raise NameUnknownError("signal", name, list(where))
+        numbers, shape = where[name]
+        columns.append(numbers)
+        shapes[name] = slice(end, end := end + numbers.size), shape
+    return np.concatenate(columns), shapes
+
+
+def _recording(
+    problem: Problem,
+    values: Array,
+    shapes: dict[str, tuple[slice, tuple[int, ...]]],
+    ended: int,
+    samples: int,
+    every: int,
+) -> Recording:
+    s = problem.sampling
+    assert s is not None
+    count = len(values) if ended == samples else ended // every + 1
+    signals = {
+        name: np.ascontiguousarray(values[:count, columns]).reshape(count, *shape)
+        for name, (columns, shape) in shapes.items()
+    }
+    time = np.arange(count, dtype=np.float64) * (s.period * every)
+    failure = "" if ended == samples else left_finite(ended * s.period)
+    return Recording(signals, time, failure, problem.law.has_tank)
+
+
+def simulate_in_lane(problem: Problem) -> Run:
+    """Return the whole run of a sampled problem with the very numbers that it has in a batch.
+
+    `simulate` gives the same but for rounding, which a sensor's resolution or an unstable loop makes visible.
+    """
+    loop = _compiled(problem).loop
+    layouts = [reported(part, layout) for part, layout in sample_parts(loop).items()]
+    (recording,) = simulate_batch([problem], [f.name for layout in layouts for f in layout])
+    rows = [
+        Rows(layout, np.hstack([recording[f.name].reshape(len(recording.time), f.size) for f in layout]))
+        for layout in layouts
+    ]
+    return assemble(problem, recording.time, rows, [], recording.failure)
