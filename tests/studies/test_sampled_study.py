@@ -13,12 +13,13 @@ import pytest
 from passiflex.errors import UnstableLoopError
 from passiflex.passivity import audit
 from passiflex.plotting.sampled import SampledPanel, draw_sampled
+from passiflex.responses.steps import displacement, step_window
 from passiflex.simulation import Run, Scenario, resolve, simulate, simulate_problem
 from passiflex.simulation.run import package_version, source_commit
 from passiflex.studies import external_torque, sampled, shipped_scenario
 from passiflex.studies.paper import ideals
 from passiflex.studies.reproduce import reproduce
-from passiflex.studies.summary import displacement, step_numbers, step_window
+from passiflex.studies.summary import response_numbers
 
 SHARED = {
     "motor_torque_peak", "lowest_true_level", "overdraft", "lowest_claimed_level", "highest_claimed_level",
@@ -177,8 +178,8 @@ def distance_to_ideal(scenario: Scenario) -> float:
     """Return the rms distance to the ideal mass-spring-damper, as a share of the step."""
     problem = resolve(scenario)
     run = simulate_problem(problem)
-    numbers = step_numbers(
-        run.time, displacement(run), ideals(problem, run.time)["msd"], step_window(scenario)
+    numbers = response_numbers(
+        run.time, displacement(run["position"]), ideals(problem, run.time)["msd"], step_window(scenario)
     )
     return numbers["rms_to_msd"]
 

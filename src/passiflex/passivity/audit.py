@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from passiflex.passivity.ledger import (
     Balance,
+    Signals,
     claimed_balance,
     initial_tank,
     link_balance,
@@ -18,7 +19,6 @@ from passiflex.passivity.ledger import (
     port_energy,
     robot_balance,
 )
-from passiflex.simulation.run import Run
 
 ROUND_OFF = 1e-13
 """An overdraft below this share of the energy at hand (or of 1 J) is round-off."""
@@ -64,7 +64,7 @@ class Audit:
         return max(0.0, -self.margin)
 
 
-def audit(run: Run) -> Audit:
+def audit(run: Signals) -> Audit:
     """Return the audit of a run."""
     robot, links, law = robot_balance(run), link_balance(run), claimed_balance(run)
     error = np.maximum.accumulate(np.abs(links.residual))
@@ -99,7 +99,7 @@ def audit(run: Run) -> Audit:
     )
 
 
-def available_energy(run: Run) -> NDArray[np.float64]:
+def available_energy(run: Signals) -> NDArray[np.float64]:
     """Return S̃₀ + T₀ − W̃(t) [J], what law and motors may still give to the links.
 
     A storage counts from its lowest value: where S̃ became negative (a gravity compensation that is not
@@ -107,11 +107,11 @@ def available_energy(run: Run) -> NDArray[np.float64]:
     """
     storage = motor_side_storage(run)
     budget = initial_tank(run) + float(storage[0] - min(storage.min(), 0.0))
-    lent = 0.0 if run.data.attrs["has_tank"] else run["reference_energy"]
+    lent = 0.0 if run.has_tank else run["reference_energy"]
     return budget + lent - port_energy(run)
 
 
-def _deciding_term(run: Run, law: Balance, index: int) -> str:
+def _deciding_term(run: Signals, law: Balance, index: int) -> str:
     draws = {
         "motion of the links": run["link_kinetic_energy"][index],
         "moving reference": run["reference_energy"][index],

@@ -7,13 +7,26 @@ positive into the system.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from passiflex.simulation.run import Run
-
 Array = NDArray[np.float64]
+
+
+class Signals(Protocol):
+    """What the books are read from: a `Run`, or the recording of one in lanes."""
+
+    @property
+    def time(self) -> Array: ...  # noqa: D102 - as in `Run`
+    @property
+    def failure(self) -> str: ...  # noqa: D102
+    @property
+    def sampled(self) -> bool: ...  # noqa: D102
+    @property
+    def has_tank(self) -> bool: ...  # noqa: D102
+    def __getitem__(self, name: str) -> Array: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +53,7 @@ class Balance:
     @classmethod
     def of(
         cls,
-        run: Run,
+        run: Signals,
         name: str,
         storages: dict[str, Array],
         supplied: dict[str, str],
@@ -74,7 +87,7 @@ class Balance:
         return float(np.abs(self.residual).max())
 
 
-def robot_balance(run: Run) -> Balance:
+def robot_balance(run: Signals) -> Balance:
     """Return the balance of the real robot, (3)–(4): true whatever the law; its residual is the integrator's."""
     return Balance.of(
         run,
@@ -90,7 +103,7 @@ def robot_balance(run: Run) -> Balance:
     )
 
 
-def link_balance(run: Run) -> Balance:
+def link_balance(run: Signals) -> Balance:
     """Return the balance of the links alone, between environment and joints: true whatever the law."""
     return Balance.of(
         run,
@@ -101,7 +114,7 @@ def link_balance(run: Run) -> Balance:
     )
 
 
-def claimed_balance(run: Run) -> Balance:
+def claimed_balance(run: Signals) -> Balance:
     """Return the law's own books: 𝓗₂ of (28) with (29), links included.
 
     They close if the law's model is right. The residual is the energy that the books miss: of model
@@ -111,7 +124,7 @@ def claimed_balance(run: Run) -> Balance:
     if run.sampled:
         return Balance(
             "law",
-            {"tank": run["tank_energy"] * run.data.attrs["has_tank"], "law": run["law_storage"]},
+            {"tank": run["tank_energy"] * run.has_tank, "law": run["law_storage"]},
             {"joints, as measured": -run["measured_port_energy"]},
             {"spilled": run["spilled_energy"]},
         )
@@ -125,14 +138,14 @@ def claimed_balance(run: Run) -> Balance:
             "shaped springs": run["shaped_spring_energy"],
             "Cartesian spring": run["cartesian_spring_energy"],
             "gravity compensation": run["gravity_storage"],
-            "tank": run["tank_energy"] if run.data.attrs["has_tank"] else np.zeros_like(run["tank_energy"]),
+            "tank": run["tank_energy"] if run.has_tank else np.zeros_like(run["tank_energy"]),
         },
         {"environment": "external", "reference": "reference"},
         {"drawn from the tank": "drawn", "dampers past the tank": "spilled"},
     )
 
 
-def motor_side_storage(run: Run) -> Array:
+def motor_side_storage(run: Signals) -> Array:
     """Return S̃(t) [J]: what law and motors store, with the weight that the law knows of carried.
 
     S̃ = ½ φ̇ᵀ B_e φ̇ + U(φ; x_d) + [V̂(q) + ½ (φ−q)ᵀ K_e (φ−q) − V_γ(φ)], with V̂ of the law's model. The
@@ -147,13 +160,13 @@ def motor_side_storage(run: Run) -> Array:
     )
 
 
-def port_energy(run: Run) -> Array:
+def port_energy(run: Signals) -> Array:
     """Return W̃(t) [J]: given to the links through the joints, ∫ τ_aᵀ q̇, less the weight lifted by it."""
     carried = run["compensated_energy"]
     return run["joint_energy"] - (carried - carried[0])
 
 
-def port_tank(run: Run) -> Array:
+def port_tank(run: Signals) -> Array:
     """Return what a tank at the joint port would hold [J]: T₀ − (S̃ − S̃₀) − W̃.
 
     It needs no formula for dissipation: with a perfect model it is T₀ + ∫ (P_D − P_X); otherwise it is
@@ -163,11 +176,11 @@ def port_tank(run: Run) -> Array:
     return initial_tank(run) - (stored - stored[0]) - port_energy(run)
 
 
-def overclaimed(run: Run) -> Array:
+def overclaimed(run: Signals) -> Array:
     """Return by how much the level that the tank claims exceeds what is there, T − T_port [J]."""
-    return run["tank_energy"] * run.data.attrs["has_tank"] - port_tank(run)
+    return run["tank_energy"] * run.has_tank - port_tank(run)
 
 
-def initial_tank(run: Run) -> float:
+def initial_tank(run: Signals) -> float:
     """Return T₀ [J]; 0 for a law without a tank."""
-    return float(run["tank_energy"][0]) if run.data.attrs["has_tank"] else 0.0
+    return float(run["tank_energy"][0]) if run.has_tank else 0.0

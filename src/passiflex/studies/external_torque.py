@@ -7,13 +7,14 @@ from typing import Any
 import numpy as np
 
 from passiflex.passivity import audit
+from passiflex.responses.metrics import rms
+from passiflex.responses.steps import displacement
 from passiflex.simulation import Run, Scenario, resolve, simulate_problem
 from passiflex.simulation.control_settings import Control, SensorSettings
 from passiflex.simulation.law_settings import ImpedanceSettings, ShapedInertia, ShapedStiffness
 from passiflex.simulation.scenario import Force
-from passiflex.studies.metrics import rms
 from passiflex.studies.paper import Report, shipped_scenario
-from passiflex.studies.summary import displacement, plain
+from passiflex.studies.summary import plain
 
 CHOICES: dict[str, dict[str, Any]] = {
     "true": {"external_torque": "true"},
@@ -55,12 +56,12 @@ def external_torque_table(report: Report = lambda text: None) -> dict[str, dict[
     for name, choice in CHOICES.items():
         report(f"external torque: {name.replace('_', ' ')}")
         runs[name] = simulate_problem(resolve(external_torque_scenario(**choice)))
-    known = displacement(runs["true"])[:, 1]
+    known = displacement(runs["true"]["position"])[:, 1]
     return {name: plain(_numbers(run, known)) for name, run in runs.items()}
 
 
 def _numbers(run: Run, known: np.ndarray) -> dict[str, Any]:
-    moved, result = displacement(run)[:, 1], audit(run)
+    moved, result = displacement(run["position"])[:, 1], audit(run)
     peak = np.abs(known).max()
     return {
         "peak_y": np.abs(moved).max(),

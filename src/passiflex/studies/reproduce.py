@@ -15,6 +15,7 @@ from passiflex.errors import NameUnknownError
 from passiflex.files import require_writable, whole_file
 from passiflex.passivity import claimed_balance
 from passiflex.plotting.figures import CircleColumn, Curve, StepColumn, draw_circle, draw_steps, save_figure
+from passiflex.responses.steps import displacement
 from passiflex.robots import FlexibleJointRobot
 from passiflex.simulation import Scenario
 from passiflex.simulation.law_settings import ImpedanceSettings
@@ -22,7 +23,7 @@ from passiflex.simulation.run import package_version, source_commit
 from passiflex.simulation.scenario import Circle, Step
 from passiflex.studies.paper import FIGURES, Case, Report, figure_cases
 from passiflex.studies.sampled import reproduce_sampled
-from passiflex.studies.summary import displacement, summarise
+from passiflex.studies.summary import summarise
 
 SAMPLED = "sampled"
 TITLES = {
@@ -126,7 +127,7 @@ def _title(case: Case) -> str:
 
 
 def _step_column(case: Case) -> StepColumn:
-    curves = {name: Curve(run.time, displacement(run)) for name, run in case.runs.items()}
+    curves = {name: Curve(run.time, displacement(run["position"])) for name, run in case.runs.items()}
     curves |= {name: Curve(r.time, r.displacement) for name, r in case.msd.items()}
     return StepColumn(_title(case), curves)
 

@@ -15,16 +15,17 @@ from passiflex.files import require_writable
 from passiflex.passivity import Audit, audit, port_tank
 from passiflex.plotting.figures import save_figure
 from passiflex.plotting.sampled import SampledPanel, draw_sampled
+from passiflex.responses.metrics import rms
+from passiflex.responses.msd import IdealResponse
+from passiflex.responses.steps import displacement, step_window
 from passiflex.simulation import Problem, Run, Scenario, resolve, simulate_problem
 from passiflex.simulation.control_settings import Drag, MotorSettings
 from passiflex.simulation.law_settings import ImpedanceSettings
 from passiflex.simulation.scenario import Circle
 from passiflex.simulation.tank_settings import TankSettings
 from passiflex.studies.external_torque import external_torque_table
-from passiflex.studies.metrics import rms
-from passiflex.studies.msd import IdealResponse
 from passiflex.studies.paper import Report, ideals, shipped_scenario
-from passiflex.studies.summary import SETTLED_CIRCLE, displacement, plain, step_numbers, step_window
+from passiflex.studies.summary import SETTLED_CIRCLE, plain, response_numbers
 
 TASKS = ("fig1", "fig2")
 DRAG = Drag.model_validate({"from": 0.0, "to": 1.0, "viscous": 5.0, "dry": 2.0})
@@ -152,7 +153,9 @@ def _distance(case: SampledCase) -> dict[str, float]:
         late = run.time >= circle.at + SETTLED_CIRCLE
         error = (run["position"] - run["desired_position"])[late, 1:]
         return {"reference_rms": rms(np.linalg.norm(error, axis=1))}
-    return step_numbers(run.time, displacement(run), case.ideal, step_window(scenario))
+    window = step_window(scenario)
+    assert window is not None
+    return response_numbers(run.time, displacement(run["position"]), case.ideal, window)
 
 
 def reproduce_sampled(folder: Path, report: Report = lambda text: None) -> tuple[list[Path], dict[str, Any]]:

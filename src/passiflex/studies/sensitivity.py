@@ -15,13 +15,13 @@ from passiflex.files import require_writable, whole_file
 from passiflex.passivity import audit, claimed_balance
 from passiflex.plotting.figures import save_figure
 from passiflex.plotting.sensitivity import Sweep, draw_sensitivity
+from passiflex.responses.metrics import largest_rise
+from passiflex.responses.msd import ideal_response
+from passiflex.responses.steps import displacement, step_numbers, step_window
 from passiflex.robots import FlexibleJointRobot
 from passiflex.simulation import Scenario, resolve, simulate_problem
 from passiflex.simulation.scenario import Circle
-from passiflex.studies.metrics import largest_rise
-from passiflex.studies.msd import ideal_response
 from passiflex.studies.paper import TARGET_RATIO, Report, shipped_scenario, with_baseline
-from passiflex.studies.summary import displacement, step_numbers, step_window
 
 POSTURES = {
     "chosen": (0.0, 0.6, 0.0, -1.2, 0.0, 1.0, 0.0),
@@ -113,9 +113,10 @@ def _step_point(v: Variant) -> dict[str, float]:
     inertia = target_inertia(gains["stiffness"], gains["damping"], TARGET_RATIO)
     ideal = ideal_response(inertia, gains["stiffness"], gains["damping"], problem.events, proposed.time)
     window = step_window(v.scenario)
+    assert window is not None
     point = {}
     for name, run in (("proposed", proposed), ("baseline", baseline)):
-        numbers = step_numbers(run.time, displacement(run), ideal, window)
+        numbers = step_numbers(run.time, displacement(run["position"]), ideal.displacement, window)
         for quantity in ("overshoot", "settling_time", "rms_to_msd"):
             point[f"{name} {quantity}"] = numbers[quantity]
     point["margin"] = audit(proposed).margin

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 import scipy.linalg
 
+from passiflex.responses.msd import IdealResponse, ideal_response
 from passiflex.simulation.gains import target_inertia
 from passiflex.simulation.motion import Motion, Pose, circle, hold, minimum_jerk
 from passiflex.simulation.problem import Event
-from passiflex.studies.msd import IdealResponse, ideal_response
 
 M, D, K = 3.4, 20.0, 60.0
 OMEGA = np.sqrt(K / M)

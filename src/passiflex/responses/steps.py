@@ -1,0 +1,60 @@
+"""The response to the first step of a scenario, in numbers."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from passiflex.responses.metrics import overshoot, rms, settling_time
+from passiflex.simulation.scenario import Scenario, Step
+
+Array = NDArray[np.float64]
+
+
+class StepWindow(NamedTuple):
+    """A step: size [m], direction (3,) of length one, and the time in which it is looked at [s]."""
+
+    size: float
+    direction: Array
+    begin: float
+    end: float
+
+
+def step_window(scenario: Scenario) -> StepWindow | None:
+    """Return the first step of a scenario until the next event of any kind; None if it has none that moves."""
+    step = next((e for e in scenario.reference if isinstance(e, Step) and any(e.by)), None)
+    if step is None:
+        return None
+    times = [e.at for e in scenario.reference] + [t for f in scenario.forces for t in (f.start, f.end)]
+    size = float(np.linalg.norm(step.by))
+    end = min([t for t in times if t > step.at] + [scenario.duration])
+    return StepWindow(size, np.array(step.by) / size, step.at, end)
+
+
+def displacement(position: Array) -> Array:
+    """Return the end effector's motion since the start, (N, 3) m."""
+    return position - position[0]
+
+
+def step_numbers(time: Array, motion: Array, ideal: Array, window: StepWindow) -> dict[str, float]:
+    """Return overshoot, settling time, offset and distance to the ideal of one response.
+
+    Parameters
+    ----------
+    time: (N,) s.
+    motion: Displacement (N, 3) m; it may have ended early.
+    ideal: Displacement of the ideal, (N, 3) m or longer.
+    """
+    start = max(int(np.searchsorted(time, window.begin)) - 1, 0)
+    along = motion @ window.direction
+    moved = along - along[start]  # from where the step finds the robot
+    inside = (time >= window.begin) & (time < window.end)
+    away = moved - ideal[: time.size] @ window.direction
+    return {
+        "overshoot": overshoot(time, moved, window.size, window.begin, window.end),
+        "settling_time": settling_time(time, moved, window.size, window.begin, window.end),
+        "offset_before_step": along[start],
+        "rms_to_msd": rms(away[inside]) / window.size,
+    }
