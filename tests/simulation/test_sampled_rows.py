@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import pytest
 
 from passiflex.simulation import resolve
 from passiflex.simulation.compiled import compiled_sampled_loop
@@ -65,6 +66,27 @@ def test_rows_do_not_depend_on_the_pieces_that_they_are_made_in() -> None:
     for pieces in ((1, 150, 349), (100, 25, 25, 25, 325), (499, 1)):
         for one, other in zip(told(*pieces, **changes), whole, strict=True):
             np.testing.assert_array_equal(one, other)
+
+
+@pytest.mark.parametrize("lasting", [2, 3, 7, 500])
+def test_a_sample_of_the_noise_lasts_as_long_as_it_is_held(lasting: int) -> None:
+    """Its numbers are those of noise that is new in every period, in their order; the last one is cut off."""
+    fresh, _, _ = told(400)
+    held, _, _ = told(400, **_held(lasting))
+    np.testing.assert_array_equal(held, np.repeat(fresh, lasting, axis=0)[:400])
+
+
+@pytest.mark.parametrize("pieces", [(1,) * 12, (5, 7), (3, 3, 6), (2, 1, 8, 1), (4, 4, 4)])
+@pytest.mark.parametrize("lasting", [3, 4, 30])
+def test_noise_that_is_held_does_not_depend_on_the_pieces(pieces: tuple[int, ...], lasting: int) -> None:
+    """Pieces that end with a sample, in the middle of one, and that lie within one."""
+    changes: dict[str, Any] = {"control": {"jitter": 1e-3, "missed": 0.3}} | _held(lasting)
+    for one, other in zip(told(*pieces, **changes), told(12, **changes), strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+def _held(lasting: int) -> dict[str, Any]:
+    return {"noise": {"torque_variance": 0.25, "hold": lasting * PERIOD}}
 
 
 def test_elapsed_counts_the_missed_periods() -> None:

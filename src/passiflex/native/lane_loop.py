@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 import casadi as cs
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from passiflex.errors import SizeError
+from passiflex.errors import SizeError, ValueRangeError
 from passiflex.native.entry import address
 from passiflex.native.held_loop import LONGEST_LINE, LoopState
 from passiflex.native.lane_source import lane_source
@@ -117,6 +117,8 @@ class LaneLoop:
     ------
     CompilerError
         If there is no compiler.
+    SizeError
+        If the functions do not fit together.
     """
 
     def __init__(self, functions: LaneFunctions, width: int | None = None):
@@ -127,6 +129,7 @@ class LaneLoop:
         self.n_told, self.n_drawn, self.n_w = f.row.size1_in(1), f.row.size1_in(2), f.row.size1_out(0)
         self.n_p_plant, self.n_p_control = f.plant.size1_in(2), f.control.size1_in(3)
         self.n_truth = f.truth.size1_out(0)
+        _require_fit(f, self)
         self.n_line = 1 + self.n_u + LONGEST_LINE * (1 + self.n_u)
         self.library = compile_source(self._source(f, width))
         loaded = ctypes.CDLL(str(self.library))
@@ -190,10 +193,26 @@ class LaneLoop:
 
         Raises
         ------
-        SizeError
-            For an argument of the wrong shape.
+        SizeError, ValueRangeError
+            For an argument of the wrong shape or outside its range.
         """
         w, n = self.width, len(inputs.drawn)
+        _require_range("period", period, period > 0 and np.isfinite(period), "a positive time in s")
+        _require_range("longest", longest, (longest > 0) & (longest < np.inf), "positive times in s")
+        _require_range(
+            "record_every",
+            record_every,
+            record_every >= 1 and not record_every % 1,
+            "a whole number, at least 1",
+        )
+        record_every = int(record_every)
+        _require_range("kept", kept, (kept >= 0) & (kept < self.instant["row"].stop), "numbers of a sample")
+        late, most = inputs.timing[:, 0], (LONGEST_LINE - 2) * period
+        _require_range(
+            "delay of a command", late, (late >= 0) & (late < most), f"0 to {LONGEST_LINE - 3} periods"
+        )
+        for change in inputs.changes:
+            _require_range("lane of a change", change.lane, 0 <= change.lane < w, f"below {w}")
         arrays = {
             "y": _aligned("y", state.y, (self.n_x + self.n_q, w)),
             "c": _aligned("controller", state.controller, (self.n_c, w)),
@@ -208,7 +227,9 @@ class LaneLoop:
             "out": _aligned("out", None, (-(-n // record_every), kept.size, w)),
         }
         changes = sorted(inputs.changes, key=lambda change: change.period)
-        told = np.array([c.told for c in changes], dtype=float).reshape(len(changes), self.n_told)
+        told = np.zeros((len(changes), self.n_told))
+        for i, c in enumerate(changes):
+            told[i] = _aligned("told in a change", c.told, (self.n_told,))
         when = np.array([(c.period, c.lane, i) for i, c in enumerate(changes)], dtype=np.int64)
         kept = np.ascontiguousarray(kept, dtype=np.int64)
         completed = np.zeros(w, dtype=np.int64)
@@ -230,6 +251,32 @@ class LaneLoop:
         lines = [f"enum {{ {', '.join(f'{name} = {size}' for name, size in sizes.items())} }};"]
         lines += [f"#define {part.upper()} {g.name()}_in_lanes" for part, g in f._asdict().items()]
         return "\n".join((lane_source(f, width), *lines, c_source("lane_loop.c")))
+
+
+def _require_range(
+    name: str, value: ArrayLike, good: bool | np.bool_ | NDArray[np.bool_], needs: str
+) -> None:
+    if not np.all(good):
+        got = f"{np.min(value)} to {np.max(value)}" if np.size(value) > 1 else value
+        raise ValueRangeError(name, got=got, needs=needs)
+
+
+def _require_fit(f: LaneFunctions, n: LaneLoop) -> None:
+    """Refuse functions that are not what `LaneFunctions` says: the native loop takes their sizes on trust."""
+    needed = {
+        "plant": ((n.n_x, n.n_u + n.n_s, n.n_p_plant), (n.n_x, n.n_q)),
+        "control": ((n.n_x, n.n_c, n.n_w, n.n_p_control), (n.n_c, n.n_u, n.n_z)),
+        "row": ((1, n.n_told, n.n_drawn), (n.n_w,)),
+        "truth": ((n.n_x, n.n_u, n.n_s, n.n_p_control), (n.n_truth,)),
+    }
+    for name, sizes in needed.items():
+        g = getattr(f, name)
+        parts = [g.sparsity_in(i) for i in range(g.n_in())], [g.sparsity_out(i) for i in range(g.n_out())]
+        found = tuple(tuple(part.size1() if part.size2() <= 1 else -1 for part in side) for side in parts)
+        if found != sizes or not all(part.is_dense() for side in parts for part in side):
+            raise SizeError(f"{name} does not fit", got=g, needs=f"dense columns of sizes {sizes}")
+    if not 0 <= n.n_s <= n.n_w:
+        raise SizeError("rows do not fit", got=f"{n.n_w} numbers", needs=f"{n.n_s} surroundings first")
 
 
 def _aligned(name: str, value: Array | None, shape: tuple[int, ...]) -> Array:

@@ -10,6 +10,8 @@ import casadi as cs
 from passiflex.errors import ValueRangeError
 from passiflex.native.library import c_source
 
+WIDTHS = (1, 2, 4, 8)
+
 _NAMES = {value: name[3:].lower() for name, value in vars(cs).items() if name.startswith("OP_")}
 _BETWEEN = {"add": "+", "sub": "-", "mul": "*", "div": "/"}
 _WRITTEN: dict[str, Callable[[str], str]] = {
@@ -31,13 +33,17 @@ def lane_source(functions: Sequence[cs.Function], width: int | None = None) -> s
     """Return C text with `NAME_in_lanes(const lanes* x0, …, lanes* y0, …)` for each function.
 
     Inputs and outputs are dense columns, one vector of lanes for each number. The text begins with
-    `lanes.h`; `width` lanes are compiled, by the processor if it is None.
+    `lanes.h`; `width` lanes are compiled, by the processor if it is None. What several quotients divide by
+    is inverted once: they then differ in the last place, and below 1e-308 altogether.
 
     Raises
     ------
     ValueRangeError
-        For a function that is not straight-line (made of SX), or uses what `lanes.h` has not.
+        For a function that is not straight-line (made of SX), or uses what `lanes.h` has not; for a width
+        that no register has.
     """
+    if width not in (None, *WIDTHS):
+        raise ValueRangeError("number of lanes", got=width, needs="one of " + ", ".join(map(str, WIDTHS)))
     chosen = "" if width is None else f"#define LANES {width}\n"
     return "\n".join((chosen + c_source("lanes.h"), *map(_function, functions)))
 

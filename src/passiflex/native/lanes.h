@@ -88,7 +88,7 @@ BY_LANE_ALONE_2(hypot)
 /* Adding and subtracting 1.5 * 2^52 rounds to a whole number, whose last bits are then those of the sum. */
 #define ROUNDER 0x1.8p52
 
-/* sin and cos of x = k pi/2 + r >= 0 by their Taylor series in r, |r| <= pi/4; pi/2 in three parts of 33 bits.
+/* sin and cos of x >= 0, x = k pi/2 + r, by their Taylor series in r, |r| <= pi/4; pi/2 in three parts of 33 bits.
  * quarter is what cos is ahead of sin: 1. */
 INLINE lanes quarter_turns(lanes x, int64_t quarter)
 {

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Hashable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +28,7 @@ from passiflex.simulation.simulate_sampled import (
 )
 
 Array = NDArray[np.float64]
+T = TypeVar("T")
 
 PIECE = 2048
 """Periods that are made ready at a time."""
@@ -40,8 +42,8 @@ class Recording:
 
     Attributes
     ----------
-    signals: By name, time first.
-    time: [s].
+    signals: By name, arrays whose first axis is the row.
+    time: Of the rows [s].
     failure: Why the run ended early; empty if it did not.
     has_tank: Whether its law has a tank.
     """
@@ -60,17 +62,30 @@ class Recording:
 def simulate_batch(
     problems: Sequence[Problem], keep: Sequence[str], *, threads: int = 1, width: int | None = None
 ) -> list[Recording]:
-    """Return the recordings of sampled problems, in their order.
+    """Return the recordings of sampled problems, in their order; see `digest_batch`."""
+    return digest_batch(problems, keep, lambda i, recording: recording, threads=threads, width=width)
+
+
+def digest_batch(
+    problems: Sequence[Problem],
+    keep: Sequence[str],
+    digest: Callable[[int, Recording], T],
+    *,
+    threads: int = 1,
+    width: int | None = None,
+) -> list[T]:
+    """Return what `digest` makes of the number and the recording of each sampled problem, in their order.
 
     Problems of the same structure and timing share the lanes of one native loop; what comes out does not
     depend on which, nor on the number of lanes or threads. A problem whose state leaves the finite numbers
-    ends there and says so. Whether a loop is stable is not asked.
+    ends there and says so. Whether a loop is stable is not asked. Recordings are dropped once they are
+    digested, so that memory does not grow with the number of problems.
 
     Parameters
     ----------
     problems: All of them with a control rate.
     keep: Names of the signals to record, of those that a `Run` has.
-    threads: How many native loops run at a time.
+    threads: How many native loops run at a time; `digest` is called from all of them.
     width: Lanes of one loop; by the processor if None. Without a C compiler the problems run one by one.
 
     Raises
@@ -84,7 +99,7 @@ def simulate_batch(
         if problem.sampling is None:
             raise SimulationError(f"{problem.name!r} has no control rate", needs="`control: {rate: …}`")
     if find_compiler() is None:
-        return [_alone(problem, keep) for problem in problems]
+        return [digest(i, _alone(problem, keep)) for i, problem in enumerate(problems)]
     groups: defaultdict[Hashable, list[int]] = defaultdict(list)
     steps = [longest_step(p, _compiled(p).plant) for p in problems]
     for i, problem in enumerate(problems):
@@ -95,15 +110,14 @@ def simulate_batch(
         group.sort(key=lambda i: steps[i])  # lanes that take as many steps as each other wait for none
         jobs += [(loop, group[i : i + loop.width]) for i in range(0, len(group), loop.width)]
 
-    def run(job: tuple[LaneLoop, list[int]]) -> list[Recording]:
+    def run(job: tuple[LaneLoop, list[int]]) -> list[tuple[int, T]]:
         loop, members = job
-        return _advance(loop, [problems[i] for i in members], np.array([steps[i] for i in members]), keep)
+        longest = np.array([steps[i] for i in members])
+        recordings = _advance(loop, [problems[i] for i in members], longest, keep)
+        return [(i, digest(i, recording)) for i, recording in zip(members, recordings, strict=True)]
 
     with ThreadPoolExecutor(threads) as pool:
-        done = list(pool.map(run, jobs))
-    found = {
-        i: r for (_, group), part in zip(jobs, done, strict=True) for i, r in zip(group, part, strict=True)
-    }
+        found = dict(pair for done in pool.map(run, jobs) for pair in done)
     return [found[i] for i in range(len(problems))]
 
 
@@ -132,6 +146,10 @@ def _alike(problem: Problem) -> Hashable:
 
 def _alone(problem: Problem, keep: Sequence[str]) -> Recording:
     run = simulate_unchecked(problem)
+    known = [str(name) for name, signal in run.data.data_vars.items() if "time" in signal.dims]
+    for name in keep:
+        if name not in known:
+            raise NameUnknownError("signal", name, known)
     return Recording({name: run[name] for name in keep}, run.time, run.failure, run.has_tank)
 
 
@@ -154,7 +172,7 @@ def _advance(
     chances = [Chance(p, compiled.loop.period) for p in filled]
     samples, piece = sample_count(problems[0]), max(1, PIECE // every) * every
     ended = np.full(lanes.width, samples)
-    pieces = []
+    values = np.full((len(problems), -(-samples // every), columns.size), np.nan)
     for first in range(0, samples, piece):
         count = min(piece, samples - first)
         drawn, timing = zip(*(chance.take(first, count) for chance in chances), strict=True)
@@ -173,12 +191,12 @@ def _advance(
             last=first + count == samples,
         )
         state = done.state
-        pieces.append(done.values)
+        begin = first // every
+        values[:, begin : begin + len(done.values)] = done.values.transpose(2, 0, 1)[: len(problems)]
         left = (done.completed < count) & (ended == samples)
         ended[left] = first + done.completed[left]
         if (ended < samples).all():
             break
-    values = np.concatenate(pieces).transpose(2, 0, 1)
     return [
         _recording(p, values[lane], shapes, int(ended[lane]), samples, every)
         for lane, p in enumerate(problems)
@@ -204,7 +222,8 @@ def _columns(
         for f in reported(part, layout):
             own = layout.slices[f.name]
             where[f.name] = np.arange(begin + own.start, begin + own.stop), f.shape
-    columns, shapes, end = [], {}, 0
+    columns: list[NDArray[np.int64]] = [np.zeros(0, np.int64)]  # of no signals
+    shapes, end = {}, 0
     for name in keep:
         if name not in where:
             raise NameUnknownError("signal", name, list(where))
@@ -226,8 +245,7 @@ def _recording(
     assert s is not None
     count = len(values) if ended == samples else ended // every + 1
     signals = {
-        name: np.ascontiguousarray(values[:count, columns]).reshape(count, *shape)
-        for name, (columns, shape) in shapes.items()
+        name: values[:count, columns].reshape(count, *shape) for name, (columns, shape) in shapes.items()
     }
     time = np.arange(count, dtype=np.float64) * (s.period * every)
     failure = "" if ended == samples else left_finite(ended * s.period)

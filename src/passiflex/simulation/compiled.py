@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import casadi as cs
 
@@ -18,6 +19,7 @@ from passiflex.native import (
     compile_functions,
     load_external,
 )
+from passiflex.robots.arm import SerialArm
 from passiflex.sampled.controller import SampledController
 from passiflex.simulation.closed_loop import ClosedLoop
 from passiflex.simulation.sampled_loop import SampledLoop
@@ -53,7 +55,7 @@ class CompiledLoop:
 def compiled_loop(law: AbstractLaw) -> CompiledLoop:
     """Return the compiled closed loop of a law; from the process, the cache on disk, or compiled now."""
     # The laws are final: their type, task and gravity choice are all that their code depends on.
-    key = (law.robot.arm.chain.to_urdf(), type(law), law.task, law.gravity)
+    key = (_urdf(law.robot.arm), type(law), law.task, law.gravity)
     if key not in _built:
         _built[key] = _compile(ClosedLoop(law))
     return _built[key]
@@ -95,9 +97,15 @@ def structure(controller: SampledController) -> tuple[object, ...]:
     """Return what the code of a sampled loop depends on; controllers that agree in it share compiled code."""
     law = controller.law
     return (
-        law.robot.arm.chain.to_urdf(), type(law), law.task, law.gravity,
+        _urdf(law.robot.arm), type(law), law.task, law.gravity,
         type(controller.tank), controller.external, controller.inner,
     )  # fmt: skip
+
+
+@lru_cache(maxsize=64)
+def _urdf(arm: SerialArm) -> str:
+    """Return the text that two arms of the same structure have in common; kept, as a campaign asks for each sample."""
+    return arm.chain.to_urdf()
 
 
 def _compile(loop: ClosedLoop) -> CompiledLoop:

@@ -108,6 +108,8 @@ def _own_tank(data: dict[str, Any]) -> TankSettings | None:
     return TankSettings().completed("port" if data.get("control") else "paper")
 
 
+QUICK_DUMPER = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
+"""That of LibYAML where there is one: a campaign writes down each of its samples."""
 WITH_CONTROL = ("sensors", "motors", "actions", "gains", "feedforward", "drags")
 """Entries of a scenario that only a sampled run has."""
 
@@ -281,4 +283,5 @@ class Scenario(Section):
     def to_yaml(self) -> str:
         """Return the text of a file that loads to an equal scenario: complete and in SI units."""
         data = self.model_dump(by_alias=True, exclude_none=True)
-        return yaml.safe_dump(data, sort_keys=False, allow_unicode=True, default_flow_style=None, width=110)
+        layout: dict[str, Any] = {"sort_keys": False, "allow_unicode": True, "default_flow_style": None}
+        return str(yaml.dump(data, Dumper=QUICK_DUMPER, width=110, **layout))
