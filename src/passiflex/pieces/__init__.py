@@ -1,0 +1,1 @@
+"""Work in pieces: computed by any engine, kept in a folder that survives whatever interrupts it."""

@@ -1,0 +1,209 @@
+"""A scheduler with two workers on this machine gives the rows of a serial run, whoever is killed."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+import pytest
+
+from passiflex.pieces.cluster import PATIENCE, Cluster
+from passiflex.pieces.run_pieces import run_pieces
+from passiflex.pieces.source import PACKAGE
+from passiflex.pieces.store import open_store
+from passiflex.pieces.worker import EngineError
+from pieces.cheap_campaign import ENVIRONMENT, PIECE, TESTS, evaluations, logged, run, text, work
+
+SAMPLES = 40
+
+distributed = pytest.importorskip("distributed")
+
+
+def free_port() -> int:
+    with socket.socket() as sock:
+        sock.bind(("127.0.0.1", 0))
+        return int(sock.getsockname()[1])
+
+
+@contextmanager
+def dask(*words: str, first: Path = TESTS) -> Iterator[subprocess.Popen[bytes]]:
+    """Give a process of dask that looks for modules there first; it has ended when the block ends."""
+    command = [sys.executable, "-m", *words, "--no-dashboard"]
+    path = {"PYTHONPATH": os.pathsep.join([str(first), ENVIRONMENT["PYTHONPATH"]])}
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    with subprocess.Popen(command, env=ENVIRONMENT | path, **quiet) as process:
+        try:
+            yield process
+        finally:
+            process.kill()
+
+
+@contextmanager
+def scheduler() -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
+    """Give the address of a scheduler that answers, and its process."""
+    port = free_port()
+    with dask("distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", str(port)) as process:
+        end = time.monotonic() + 20
+        while True:
+            try:
+                socket.create_connection(("127.0.0.1", port)).close()
+                break
+            except ConnectionRefusedError:
+                assert time.monotonic() < end
+                time.sleep(0.02)
+        yield f"tcp://127.0.0.1:{port}", process
+
+
+def worker(address: str, threads: int = 1, **environment: str):
+    words = ["--host", "127.0.0.1", "--nthreads", str(threads), "--no-nanny"]
+    return dask("distributed.cli.dask_worker", address, *words, **environment)
+
+
+def wait_for_workers(address: str, count: int) -> None:
+    """Wait until the scheduler knows of so many; they take seconds to start on a busy machine."""
+    with distributed.Client(address, timeout=20, set_as_default=False) as client:
+        end = time.monotonic() + 30
+        while len(client.nthreads()) != count:
+            assert time.monotonic() < end
+            time.sleep(0.02)
+
+
+def test_a_killed_worker_costs_its_own_piece_only(tmp_path: Path) -> None:
+    log, lone = tmp_path / "log", tmp_path / "lone"
+    campaign = text(sleep=0.02, log=str(log))
+    with ExitStack() as stack:
+        address, _ = stack.enter_context(scheduler())
+        workers = [stack.enter_context(worker(address)) for _ in range(2)]
+        wait_for_workers(address, 2)
+        with open_store(tmp_path / "c", campaign, SAMPLES, piece=PIECE) as store, Cluster(address) as engine:
+            assert engine.in_flight == 4
+            killed = []
+
+            def kill_one(_: object) -> None:
+                if store.done >= 3 * PIECE and not killed:
+                    killed.append({process for _, process in logged(log)})
+                    workers[0].kill()
+
+            path = run_pieces(store, work, engine, kill_one)
+        assert killed == [{process.pid for process in workers}]
+    assert path.read_bytes() == run(lone, 0, SAMPLES).read_bytes()
+    counts = evaluations(log)
+    assert set(counts) == set(range(SAMPLES))
+    assert max(counts.values()) <= 2
+    assert sum(counts.values()) <= SAMPLES + 2 * PIECE
+
+
+def test_a_scheduler_that_is_not_there_is_one_line_within_seconds() -> None:
+    script = f"""
+import time
+import distributed
+from passiflex.pieces.cluster import Cluster
+from passiflex.errors import PassiflexError
+start = time.monotonic()
+try:
+    Cluster("tcp://127.0.0.1:{free_port()}")
+except PassiflexError as error:
+    print(error)
+print(time.monotonic() - start)
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", script], env=ENVIRONMENT, capture_output=True, text=True, timeout=30
+    )
+    assert done.stderr == ""
+    line, seconds = done.stdout.splitlines()
+    assert line.startswith("no scheduler answers at tcp://127.0.0.1:")
+    assert float(seconds) < 2 * PATIENCE
+
+
+@pytest.mark.parametrize("address", ["", "nonsense", "nonsense://127.0.0.1:1", "tcp://127.0.0.1"])
+def test_an_address_that_is_none_is_refused(address: str) -> None:
+    with pytest.raises(EngineError, match=r"no address of a scheduler; got .*; needs one as tcp://host:8786"):
+        Cluster(address)
+
+
+def test_workers_that_are_not_fit_are_refused(tmp_path: Path) -> None:
+    changed, older = tmp_path / "changed", tmp_path / "older"
+    shutil.copytree(PACKAGE, changed / "passiflex", ignore=shutil.ignore_patterns("__pycache__"))
+    with (changed / "passiflex" / "layout.py").open("a") as file:
+        file.write("\n")
+    (older / "passiflex").mkdir(parents=True)
+    (older / "passiflex" / "__init__.py").touch()
+    with scheduler() as (address, _):
+        with worker(address, first=changed):
+            wait_for_workers(address, 1)
+            refusal = refused(address)
+        wait_for_workers(address, 0)
+        assert re.fullmatch(
+            r"the worker at tcp://[\d.:]+ has another passiflex; got \w{16}; needs source \w{16}, as here",
+            refusal,
+        )
+        with worker(address, first=older):
+            wait_for_workers(address, 1)
+            refusal = refused(address)
+        wait_for_workers(address, 0)
+        assert "has another passiflex; got ModuleNotFoundError(" in refusal
+        with worker(address, threads=2):
+            wait_for_workers(address, 1)
+            refusal = refused(address)
+        wait_for_workers(address, 0)
+        assert "shares its interpreter; got 2 threads; try `dask worker" in refusal
+        assert refused(address).startswith(f"the scheduler at {address} has no workers; try `dask worker")
+
+
+def refused(address: str) -> str:
+    """Return why a cluster is refused."""
+    with pytest.raises(EngineError) as error:
+        Cluster(address)
+    return str(error.value)
+
+
+LOSING = """
+import sys
+from pathlib import Path
+from pieces.cheap_campaign import PIECE, work
+from passiflex.pieces.cluster import PATIENCE, Cluster
+from passiflex.pieces.run_pieces import run_pieces
+from passiflex.pieces.store import open_store
+from passiflex.errors import PassiflexError
+folder, address, campaign = sys.argv[1:]
+try:
+    with open_store(folder, campaign, 1000, piece=PIECE) as store, Cluster(address) as engine:
+        run_pieces(store, work, engine)
+except PassiflexError as error:
+    print(error)
+"""
+
+
+def test_a_scheduler_that_is_lost_is_one_line_and_keeps_the_pieces(tmp_path: Path) -> None:
+    campaign = text(sleep=0.02)
+    with scheduler() as (address, process), worker(address):
+        wait_for_workers(address, 1)
+        words = [sys.executable, "-c", LOSING, str(tmp_path), address, campaign]
+        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+        with subprocess.Popen(words, env=ENVIRONMENT, text=True, **pipes) as run:
+            try:
+                while len(list(tmp_path.glob("pieces/0*"))) < 3:
+                    assert run.poll() is None
+                    time.sleep(0.02)
+                process.kill()
+                out, err = run.communicate(timeout=20)
+            finally:
+                run.kill()
+    assert err == ""
+    assert re.fullmatch(r"samples \d+ to \d+ cannot be evaluated; got the scheduler gave up .*\n", out)
+    with open_store(tmp_path, campaign, 1000) as store:
+        assert store.done >= 3 * PIECE
+
+
+def test_without_dask_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "distributed", None)  # as if it were not installed
+    with pytest.raises(EngineError, match=r"needs dask.distributed; .* try pip install 'passiflex\[dask\]'"):
+        Cluster("tcp://127.0.0.1:8786")
