@@ -19,15 +19,19 @@ ROOMS = (
     "native",
     "simulation",
     "passivity",
+    "responses",
     "limits",
+    "pieces",
+    "campaigns",
     "plotting",
     "studies",
     "cli",
 )
 """A room imports from itself and from the rooms before it."""
 
-ONLY = {"native": FOUNDATION}
-"""What a room may import when that is less than the order allows: native knows nothing of robots and laws."""
+ONLY = {"native": FOUNDATION, "pieces": (*FOUNDATION, "simulation")}
+"""What a room may import when that is less than the order allows: both know nothing of robots and laws;
+pieces asks simulation for the version only."""
 
 DRAWN_BY = ("plotting", "studies", "cli")
 """The only rooms that import plotting."""

@@ -1,0 +1,154 @@
+"""From samples to rows: draw, resolve, run side by side, measure. And one sample again, in full."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from passiflex.campaigns.campaign import Campaign
+from passiflex.campaigns.campaign_file import parse_campaign
+from passiflex.campaigns.draws import columns, draws, words
+from passiflex.campaigns.measures import MEASURES, SIGNALS, measures
+from passiflex.campaigns.samples import sample_scenario
+from passiflex.errors import NameUnknownError, PassiflexError, ValueRangeError
+from passiflex.passivity.ledger import Signals
+from passiflex.pieces.manifest import load_manifest
+from passiflex.responses.steps import displacement, step_window
+from passiflex.simulation import Run, Scenario, resolve, simulate_problem
+from passiflex.simulation.batch import digest_batch, simulate_in_lane
+from passiflex.simulation.problem import Problem
+
+REFUSED = "refused"
+"""Verdict of a sample that is no possible robot or scenario: it was not run, and `failure` says why."""
+TEXTS = ("verdict", "decided_by", "failure")
+
+
+def evaluate_samples(text: str, samples: Sequence[int]) -> list[dict[str, Any]]:
+    """Return a row for each sample of the campaign of this text; nothing else has a part in it.
+
+    A row has the draws, verdict, measures, and what is kept of the response.
+    """
+    campaign = _campaign(text)
+    names = columns(campaign)
+    drawn = draws(campaign, samples)
+    known = words(campaign)
+    rows: dict[int, dict[str, Any]] = {}
+    ready: list[tuple[int, Scenario, Problem]] = []
+    for i, values in zip(samples, drawn, strict=True):
+        said = {n: known[n][int(v)] if n in known else float(v) for n, v in zip(names, values, strict=True)}
+        rows[i] = {"sample": i, **said}
+        try:
+            scenario = sample_scenario(campaign, i)
+            ready.append((i, scenario, resolve(scenario)))
+        except PassiflexError as error:
+            rows[i] |= _refused(campaign, str(error))
+    kept = (*TEXTS, *kept_measures(campaign))
+
+    def row(k: int, run: Signals) -> dict[str, Any]:
+        _, scenario, problem = ready[k]
+        measured = measures(problem, step_window(scenario), run)
+        return {name: measured[name] for name in kept} | _kept_response(campaign, run)
+
+    for (i, *_), measured in zip(ready, _digested([p for *_, p in ready], row), strict=True):
+        rows[i] |= measured
+    return [rows[i] for i in samples]
+
+
+def evaluate_problems(problems: Sequence[Problem], scenarios: Sequence[Scenario]) -> list[dict[str, Any]]:
+    """Return the measures of problems, run side by side."""
+    return _digested(problems, lambda k, run: measures(problems[k], step_window(scenarios[k]), run))
+
+
+def kept_measures(campaign: Campaign) -> tuple[str, ...]:
+    """Return the names of the measures that a campaign keeps.
+
+    Raises
+    ------
+    NameUnknownError
+        For a name that is none.
+    """
+    wanted = campaign.keep.metrics or tuple(MEASURES)
+    for name in (*wanted, *((campaign.keep.by,) if campaign.keep.by else ())):
+        if name not in MEASURES:
+            raise NameUnknownError("metric", name, list(MEASURES))
+    return wanted
+
+
+def require_response(campaign: Campaign) -> None:
+    """Raise ValueRangeError unless the interval of the response fits the rows of the scenario."""
+    interval, step = campaign.keep.response, campaign.scenario.output_interval
+    if interval is not None and abs(interval / step - round(interval / step)) > 1e-9 * interval / step:
+        raise ValueRangeError(
+            "keep.response", got=f"{interval:g} s", needs=f"a whole multiple of output_interval, {step:g} s"
+        )
+
+
+def replay(folder: str | Path, sample: int) -> Run:
+    """Return the full run of one sample of a campaign's folder, with the numbers of its row.
+
+    Raises
+    ------
+    FolderError, ValueRangeError
+        If the folder holds no campaign, or it has no such sample.
+    """
+    return run_sample(_campaign(load_manifest(Path(folder)).campaign), sample)
+
+
+def run_sample(campaign: Campaign, sample: int) -> Run:
+    """Return the full run of one sample."""
+    problem = resolve(sample_scenario(campaign, sample))
+    return simulate_in_lane(problem) if problem.sampling else simulate_problem(problem)
+
+
+def _digested(
+    problems: Sequence[Problem], digest: Callable[[int, Signals], dict[str, Any]]
+) -> list[dict[str, Any]]:
+    """Return what `digest` makes of the number and the signals of each problem, side by side where they are sampled."""
+    sampled = [k for k, p in enumerate(problems) if p.sampling]
+    done = dict(
+        zip(
+            sampled,
+            digest_batch([problems[k] for k in sampled], SIGNALS, lambda k, run: digest(sampled[k], run)),
+            strict=True,
+        )
+    )
+    return [done[k] if k in done else digest(k, simulate_problem(p)) for k, p in enumerate(problems)]
+
+
+def _refused(campaign: Campaign, why: str) -> dict[str, Any]:
+    numbers = dict.fromkeys(kept_measures(campaign), math.nan)
+    texts = {"verdict": REFUSED, "decided_by": "", "failure": why}
+    return texts | numbers | dict.fromkeys(_response_names(campaign), _padded(campaign, np.zeros(0)))
+
+
+def _kept_response(campaign: Campaign, run: Signals) -> dict[str, list[float]]:
+    names = _response_names(campaign)
+    if not names or campaign.keep.response is None:
+        return {}
+    every = round(campaign.keep.response / campaign.scenario.output_interval)
+    moved = displacement(run["position"])[::every]
+    return {name: _padded(campaign, moved[:, i]) for i, name in enumerate(names)}
+
+
+def _response_names(campaign: Campaign) -> tuple[str, ...]:
+    return tuple(f"displacement_{a}" for a in "xyz") if campaign.keep.response else ()
+
+
+def _padded(campaign: Campaign, values: NDArray[np.float64]) -> list[float]:
+    """Return the values of a run that may have ended early, at all instants of a whole one."""
+    assert campaign.keep.response is not None
+    count = int(campaign.scenario.duration / campaign.keep.response + 1e-9) + 1
+    out = np.full(count, np.nan)
+    out[: min(count, values.size)] = values[:count]
+    return out.tolist()
+
+
+@lru_cache(maxsize=8)
+def _campaign(text: str) -> Campaign:
+    return parse_campaign(text, source="campaign")

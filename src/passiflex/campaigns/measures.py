@@ -1,0 +1,144 @@
+"""What is measured of each sample: verdict, energies at the ports, effort, and the response."""
+
+from __future__ import annotations
+
+import math
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from passiflex.passivity import audit
+from passiflex.passivity.ledger import Signals
+from passiflex.responses.closed_form import ideal_displacement
+from passiflex.responses.metrics import rms
+from passiflex.responses.steps import StepWindow, displacement, step_numbers
+from passiflex.simulation.gains import target_inertia
+from passiflex.simulation.problem import Problem
+
+Array = NDArray[np.float64]
+
+IDEAL_RATIO = 0.7
+"""ζ of the ideal mass-spring-damper, which gives it its mass."""
+
+
+class Measure(NamedTuple):
+    """One number of a sample: its unit, which end is the bad one, and what it says."""
+
+    unit: str
+    worst: Literal["low", "high"]
+    meaning: str
+
+
+ENERGIES = {
+    "external_energy": "that the environment gave",
+    "motor_energy": "that the motors gave",
+    "joint_energy": "that went to the links through the joints",
+    "reference_energy": "that the moving reference put into the Cartesian spring",
+}
+MEASURES = {
+    "margin": Measure("J", "low", "least of what law and motors may still give to the links"),
+    "overdraft": Measure("J", "high", "largest energy given beyond what was there"),
+    "decided_at": Measure("s", "low", "when the verdict was decided"),
+    "claimed_beyond_true": Measure("J", "high", "most that the law's books claim beyond what is there"),
+    "integration_error": Measure("J", "high", "largest residual of the links' balance"),
+    **{name: Measure("J", "high", f"at the end, {text}") for name, text in ENERGIES.items()},
+    "tank_energy_end": Measure("J", "low", "level of the tank at the end"),
+    "tank_energy_min": Measure("J", "low", "lowest recorded level of the tank"),
+    "governed_share": Measure("1", "high", "share of the time in which the reference was held back"),
+    "fell_back_at": Measure("s", "low", "when the fallback took over; not finite if it did not"),
+    "torque_peak": Measure("N m", "high", "largest motor torque"),
+    "torque_share": Measure("1", "high", "the same as a share of the joint's limit"),
+    "velocity_share": Measure("1", "high", "largest link velocity as a share of the joint's limit"),
+    "joint_limit_margin": Measure("rad", "low", "least distance to the end of a joint's range"),
+    "tracking_rms": Measure("m", "high", "distance of the end effector from x_d"),
+    "overshoot": Measure("1", "high", "beyond the step, as a share of it"),
+    "settling_time": Measure("s", "high", "until the response stays within 2 % of the step"),
+    "offset_before_step": Measure("m", "high", "motion along the step before it"),
+    "rms_to_msd": Measure("1", "high", "distance to the ideal mass-spring-damper, as a share of the step"),
+    "end_time": Measure("s", "low", "simulated time; shorter than the duration if the run ended early"),
+}
+"""What can be kept and asked for, by name."""
+
+SIGNALS = (
+    "position", "desired_position", "q", "dq", "tau_m",
+    "link_kinetic_energy", "motor_kinetic_energy", "joint_spring_energy", "potential_energy",
+    "external_energy", "motor_energy", "joint_energy", "joint_loss_energy", "friction_energy", "reference_energy",
+    "external_power", "motor_power", "joint_power", "joint_loss_power", "friction_power",
+    "tank_energy", "law_storage", "measured_port_energy", "spilled_energy",
+    "compensated_energy", "shaped_kinetic_energy", "shaped_spring_energy", "cartesian_spring_energy",
+    "gravity_storage", "governed_time", "latched",
+)  # fmt: skip
+"""What is recorded of a sampled run for it."""
+
+
+def measures(problem: Problem, window: StepWindow | None, run: Signals) -> dict[str, float | str]:
+    """Return verdict, what decided it, why the run failed, and the numbers of `MEASURES`."""
+    result, robot = audit(run), problem.law.robot
+    torque, q, dq, end = np.abs(run["tau_m"]), run["q"], np.abs(run["dq"]), run.time[-1]
+    low, high = robot.position_limit.T
+    numbers: dict[str, float | str] = {
+        "verdict": result.verdict,
+        "decided_by": result.term,
+        "failure": run.failure,
+        "margin": result.margin,
+        "overdraft": result.overdraft,
+        "decided_at": result.time,
+        "claimed_beyond_true": result.books_error,
+        "integration_error": result.integration_error,
+        **{name: run[name][-1] for name in ENERGIES},
+        "tank_energy_end": run["tank_energy"][-1] if run.has_tank else math.nan,
+        "tank_energy_min": run["tank_energy"].min() if run.has_tank else math.nan,
+        **_governor(run),
+        "torque_peak": torque.max(),
+        "torque_share": (torque / robot.torque_limit).max(),
+        "velocity_share": (dq / robot.velocity_limit).max(),
+        "joint_limit_margin": min((q - low).min(), (high - q).min()),
+        "tracking_rms": rms(np.linalg.norm(run["position"] - run["desired_position"], axis=1)),
+        **_response(problem, window, run),
+        "end_time": end,
+    }
+    return {name: v if isinstance(v, str) else float(v) for name, v in numbers.items()}
+
+
+def _governor(run: Signals) -> dict[str, float]:
+    if not run.sampled:
+        return {"governed_share": math.nan, "fell_back_at": math.nan}
+    latched, end = run["latched"] > 0, run.time[-1]
+    return {
+        "governed_share": run["governed_time"][-1] / end if end else 0.0,
+        "fell_back_at": run.time[latched.argmax()] if latched.any() else math.nan,
+    }
+
+
+def _response(problem: Problem, window: StepWindow | None, run: Signals) -> dict[str, float]:
+    """Return the numbers of the step; not finite where there is none, and a run that ended early did not settle."""
+    if window is None or run.failure:
+        missing = dict.fromkeys(("overshoot", "offset_before_step", "rms_to_msd"), math.nan)
+        return missing | {"settling_time": math.nan if window is None else math.inf}
+    moved = displacement(run["position"])
+    numbers = step_numbers(run.time, moved, _ideal(problem, len(run.time)), window)
+    changing = problem.sampling is not None and problem.sampling.gains
+    return numbers | ({"rms_to_msd": math.nan} if changing else {})
+
+
+_ideals: dict[tuple[object, ...], Array] = {}
+
+
+def _ideal(problem: Problem, count: int) -> Array:
+    """Return the ideal's displacement at the rows of a run; samples that differ in the robot only share it."""
+    gains = problem.law.layout.unpack(problem.gains)
+    stiffness, damping = gains["stiffness"], gains["damping"]
+    inertia = target_inertia(stiffness, damping, IDEAL_RATIO)
+    moving = [e for e in problem.events if e.motion is not None]
+    key = (
+        inertia.tobytes(), stiffness.tobytes(), damping.tobytes(), problem.output_interval, count,
+        *(e.time for e in problem.events), *(e.F_e.tobytes() for e in problem.events),
+        *(np.asarray(v).tobytes() for e in moving if e.motion for v in e.motion.values()),
+    )  # fmt: skip
+    if key not in _ideals:
+        if len(_ideals) >= 64:
+            _ideals.clear()
+        interval = problem.output_interval
+        _ideals[key] = ideal_displacement(inertia, stiffness, damping, problem.events, interval, count)
+    return _ideals[key]

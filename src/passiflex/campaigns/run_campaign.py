@@ -1,0 +1,161 @@
+"""A campaign from its definition to a folder of results, on this machine or on a cluster."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import pyarrow as pa
+import yaml
+
+from passiflex.campaigns.campaign import Campaign
+from passiflex.campaigns.campaign_file import parse_campaign
+from passiflex.campaigns.evaluate import evaluate_samples, kept_measures, require_response, run_sample
+from passiflex.campaigns.measures import MEASURES
+from passiflex.campaigns.possible import require_possible
+from passiflex.errors import ValueRangeError
+from passiflex.pieces.cluster import Cluster
+from passiflex.pieces.engines import Engine, InProcess, LocalProcesses
+from passiflex.pieces.manifest import load_manifest
+from passiflex.pieces.run_pieces import Progress, run_pieces
+from passiflex.pieces.store import open_store
+from passiflex.pieces.stored_rows import read_rows
+from passiflex.simulation import resolve
+from passiflex.simulation.admissible import require_stable
+from passiflex.simulation.batch import lane_loop
+
+RUNS = "runs"
+"""Folder of the worst samples' full runs, within that of the results."""
+
+
+@dataclass(frozen=True)
+class Results:
+    """A finished campaign in its folder.
+
+    Attributes
+    ----------
+    folder: Where.
+    campaign: What was run.
+    runs: Files of the full runs that were kept, the worst first.
+    """
+
+    folder: Path
+    campaign: Campaign
+    runs: tuple[Path, ...] = ()
+
+    def rows(self) -> pa.Table:
+        """Return one row for each sample, in their order."""
+        return read_rows(self.folder)
+
+    @classmethod
+    def load(cls, folder: str | Path) -> Results:
+        """Return the results of a folder, finished or not.
+
+        Raises
+        ------
+        FolderError
+            If it holds none.
+        """
+        folder = Path(folder)
+        campaign = parse_campaign(load_manifest(folder).campaign, source=str(folder))
+        return cls(folder, campaign, tuple(sorted((folder / RUNS).glob("*.nc"))))
+
+
+def run_campaign(
+    campaign: Campaign,
+    folder: str | Path,
+    *,
+    samples: int | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    on_progress: Callable[[Progress], None] = lambda progress: None,
+) -> Results:
+    """Run what a folder misses of a campaign; the rows do not depend on engine, workers or interruptions.
+
+    Parameters
+    ----------
+    samples: Instead of the campaign's own number.
+    workers: Processes of this machine, 0 for this one; one for each core if None.
+    scheduler: Address of a `dask.distributed` scheduler, in place of `workers`.
+
+    Raises
+    ------
+    PassiflexError
+        Before the start for impossible robots, an unstable loop that is not insisted on, unknown metrics, a
+        folder of something else, a scheduler that does not answer; later for a disk that is full.
+    """
+    if samples is not None:
+        campaign = parse_campaign(_with_samples(campaign, samples), source="campaign")
+    kept_measures(campaign)
+    require_response(campaign)
+    require_possible(campaign)
+    _require_stable(campaign)
+    with _engine(workers, scheduler) as engine:
+        prefix = campaign.sampling != "latin_hypercube"
+        text, identity = campaign.to_yaml(), _with_samples(campaign, None)
+        with open_store(folder, text, campaign.samples, extends=prefix, identity=identity) as store:
+            run_pieces(store, evaluate_samples, engine, on_progress)
+    results = Results(Path(folder), campaign)
+    return Results(results.folder, campaign, _keep_worst(results))
+
+
+def worst(results: Results, measure: str, count: int) -> list[int]:
+    """Return the numbers of the samples that are worst by a measure, the worst first.
+
+    Samples whose run left the finite numbers come before all others, the earliest first; refused ones and
+    those where the measure is no number are left out.
+    """
+    table = results.rows()
+    values, ends = table[measure].to_pylist(), table["failure"].to_pylist()
+    sign = 1.0 if MEASURES[measure].worst == "low" else -1.0
+    found = [
+        (not failure, sign * value, i)
+        for i, (value, failure, verdict) in enumerate(
+            zip(values, ends, table["verdict"].to_pylist(), strict=True)
+        )
+        if verdict != "refused" and value is not None and not math.isnan(value)
+    ]
+    return [i for *_, i in sorted(found)[:count]]
+
+
+def _keep_worst(results: Results) -> tuple[Path, ...]:
+    keep = results.campaign.keep
+    if keep.by is None:
+        return ()
+    folder = results.folder / RUNS
+    paths = []
+    for i in worst(results, keep.by, keep.worst):
+        path = folder / f"sample_{i}.nc"
+        if not path.exists():
+            run_sample(results.campaign, i).save(path)
+        paths.append(path)
+    for other in set(folder.glob("sample_*.nc")) - set(paths):  # an extended campaign has other worst samples
+        other.unlink()
+    return tuple(paths)
+
+
+def _engine(workers: int | None, scheduler: str | None) -> Engine:
+    if scheduler is not None and workers is not None:
+        raise ValueRangeError("workers and scheduler", got=f"{workers}, {scheduler}", needs="one of the two")
+    if scheduler is not None:
+        return Cluster(scheduler)
+    return InProcess() if workers == 0 else LocalProcesses(workers)
+
+
+def _require_stable(campaign: Campaign) -> None:
+    """Refuse a loop that is unstable before anything is drawn, and have its lanes compiled once for all workers."""
+    base = resolve(campaign.scenario)
+    if base.sampling is not None:
+        require_stable(base)
+        lane_loop(base)
+
+
+def _with_samples(campaign: Campaign, samples: int | None) -> str:
+    """Return the campaign's text with another number of samples, or without any."""
+    data = yaml.safe_load(campaign.to_yaml())
+    data.pop("samples")
+    if samples is not None:
+        data["samples"] = samples
+    return yaml.safe_dump(data, sort_keys=False, allow_unicode=True)
