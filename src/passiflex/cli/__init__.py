@@ -1,4 +1,4 @@
-"""The command line: `passiflex reproduce | simulate | audit | limits | robots`."""
+"""The command line: `passiflex reproduce | simulate | audit | limits | campaign | replay | search | robots`."""
 
 from __future__ import annotations
 
@@ -7,7 +7,9 @@ import sys
 
 def main() -> None:
     """Run the command line; a mistake of the user ends with one line on what to do, not with a traceback."""
-    from passiflex.cli.commands import app
+    from passiflex.cli import campaign_commands as _campaign_commands  # noqa: F401 - registers its commands
+    from passiflex.cli import commands as _commands  # noqa: F401
+    from passiflex.cli.terminal import app
     from passiflex.errors import PassiflexError
 
     try:

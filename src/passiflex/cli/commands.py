@@ -2,24 +2,17 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import cyclopts
-from rich.console import Console
 from rich.table import Table
+
+from passiflex.cli.terminal import app, console, progress_lines, timed
 
 if TYPE_CHECKING:
     from passiflex.simulation import Run
 
-app = cyclopts.App(
-    name="passiflex",
-    help="Passive Cartesian impedance control of flexible-joint robots, with its energy accounted for.",
-)
-console = Console(soft_wrap=True, highlight=False)
 EXIT = {"passive": 0, "violated": 1, "inconclusive": 2}
 
 
@@ -38,17 +31,17 @@ def reproduce(
     Writes per figure a PNG, a PDF and the runs as netCDF, and one summary.json. With --sensitivity, one
     figure that shows how the conclusions move with what the paper does not print.
     """
-    with _timed():
+    with timed():
         if sensitivity:
             from passiflex.studies.sensitivity import run_sensitivity
 
             _refuse_names(figures)
-            with _progress() as report:
+            with progress_lines() as report:
                 written = {"sensitivity": run_sensitivity(out, report)}
         else:
             from passiflex.studies.reproduce import reproduce as run_reproduce
 
-            with _progress() as report:
+            with progress_lines() as report:
                 written = run_reproduce(figures, out, report)
         for paths in written.values():
             for path in paths:
@@ -66,8 +59,8 @@ def simulate(
     from passiflex.files import require_writable
     from passiflex.simulation import load_scenario, resolve, simulate_problem
 
-    with _timed():
-        with _progress() as report:
+    with timed():
+        with progress_lines() as report:
             _refuse_target(scenario, out)
             read = load_scenario(scenario)
             require_writable(out.parent)
@@ -140,8 +133,8 @@ def limits(
     from passiflex.limits.recommend_for import recommend_for
     from passiflex.limits.subject import sampled_problem
 
-    with _timed():
-        with _progress() as report:
+    with timed():
+        with progress_lines() as report:
             problem = sampled_problem(scenario, rate, delay)
             if out is not None:
                 require_writable(out)
@@ -198,24 +191,3 @@ def _refuse_names(figures: tuple[str, ...]) -> None:
 
     if figures:
         raise PassiflexError("--sensitivity takes no figure names", got=" ".join(figures))
-
-
-@contextmanager
-def _timed() -> Iterator[None]:
-    start = time.perf_counter()
-    yield
-    console.print(f"took {time.perf_counter() - start:.1f} s")
-
-
-@contextmanager
-def _progress() -> Iterator[Callable[[str], None]]:
-    """Give a function that shows what is being done: live on a terminal, a line each otherwise."""
-    if not console.is_terminal:
-        yield lambda text: console.print(text)
-        return
-    with console.status("starting") as status:
-
-        def report(text: str) -> None:
-            status.update(text)
-
-        yield report
