@@ -41,8 +41,7 @@ docs: $(VENV)/.dev-stamp ## build the documentation into docs/_build/html; a war
 	$(BIN)/python -m sphinx -W -b html docs docs/_build/html $(ARGS)
 
 bench: $(VENV)/.dev-stamp ## run every script in benchmarks/
-	@for script in benchmarks/*.py; do \
-	    if [ ! -e "$$script" ]; then echo "benchmarks/ has no scripts"; break; fi; \
+	@for script in $$(grep -l __main__ benchmarks/*.py); do \
 	    echo "== $$script"; $(BIN)/python "$$script" $(ARGS) || exit 1; \
 	done
 
