@@ -10,7 +10,15 @@ project = "passiflex"
 author = "the passiflex authors"
 exclude_patterns = ["_build"]
 
-extensions = ["myst_parser", "sphinx.ext.autodoc", "mathml", "scenario_tables", "docstrings", "made_figures"]
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "mathml",
+    "scenario_tables",
+    "measures_table",
+    "docstrings",
+    "made_figures",
+]
 myst_enable_extensions = ["amsmath", "colon_fence", "deflist", "dollarmath"]
 myst_heading_anchors = 3
 default_role = "code"

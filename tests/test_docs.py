@@ -67,13 +67,13 @@ def test_python_runs(block: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 
 @pytest.mark.parametrize("block", shown("sh"))
 def test_commands_exist(block: str) -> None:
-    from passiflex.cli.commands import app
+    from passiflex.cli import application
 
     targets = re.findall(r"^(\w+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE)
     for line in block.splitlines():
         words = shlex.split(line, comments=True)
         if words[:1] == ["passiflex"]:
-            app.parse_args(words[1:], print_error=False, exit_on_error=False)
+            application().parse_args(words[1:], print_error=False, exit_on_error=False)
         elif words[:1] == ["make"]:
             assert words[1] in targets
 

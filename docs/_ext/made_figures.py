@@ -39,12 +39,26 @@ def limits(folder: Path) -> Path:
     return folder / "limits.png"
 
 
-MAKERS: dict[str, Callable[[Path], Path]] = {"sampled.png": sampled, "limits.png": limits}
+def uncertainty(folder: Path) -> Path:
+    """Return the figure of the study `uncertainty`, of fewer robots than the study has."""
+    from passiflex.studies.uncertainty import reproduce_uncertainty
+
+    reproduce_uncertainty(folder, samples=64)
+    return folder / "uncertainty.png"
+
+
+MAKERS: dict[str, Callable[[Path], Path]] = {
+    "sampled.png": sampled,
+    "limits.png": limits,
+    "uncertainty.png": uncertainty,
+}
 
 
 def make(app: Sphinx) -> None:
     """Make every figure that is missing, or older than the package."""
-    changed = max(path.stat().st_mtime for path in SOURCE.rglob("*") if path.suffix in (".py", ".c", ".yaml"))
+    changed = max(
+        path.stat().st_mtime for path in SOURCE.rglob("*") if path.suffix in (".py", ".c", ".h", ".yaml")
+    )
     target = Path(app.srcdir) / "generated"
     target.mkdir(exist_ok=True)
     for name, maker in MAKERS.items():

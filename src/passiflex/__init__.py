@@ -5,8 +5,9 @@
     run = pf.simulate(pf.shipped_scenario("fig1"))
     print(pf.audit(run).verdict)
 
-The rooms, in the order in which they may import each other: `robots`, `phs`, `control`, `native`,
-`simulation`, `passivity`, `limits`, `studies`, `cli`; `plotting` draws what these produce.
+The rooms, in the order in which they may import each other: `robots`, `phs`, `control`, `sampled`, `native`,
+`simulation`, `passivity`, `responses`, `limits`, `pieces`, `campaigns`, `studies`, `cli`; `plotting` draws what
+these produce.
 """
 
 from __future__ import annotations
@@ -15,6 +16,9 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from passiflex.campaigns import load_campaign as load_campaign
+    from passiflex.campaigns import replay as replay
+    from passiflex.campaigns import run_campaign as run_campaign
     from passiflex.control import ImpedanceLaw as ImpedanceLaw
     from passiflex.control import RigidImpedanceLaw as RigidImpedanceLaw
     from passiflex.limits import check as check
@@ -43,8 +47,11 @@ _ROOMS = {
     "catalogue": "robots",
     "check": "limits",
     "limit_map": "limits",
+    "load_campaign": "campaigns",
     "load_scenario": "simulation",
     "recommend": "limits",
+    "replay": "campaigns",
+    "run_campaign": "campaigns",
     "shipped_scenario": "studies",
     "simulate": "simulation",
 }

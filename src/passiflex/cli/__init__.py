@@ -3,17 +3,26 @@
 from __future__ import annotations
 
 import sys
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from cyclopts import App
+
+
+def application() -> App:
+    """Return the command line with all its commands."""
+    from passiflex.cli import campaign_commands, commands  # noqa: F401 - they register their commands
+    from passiflex.cli.terminal import app
+
+    return app
 
 
 def main() -> None:
     """Run the command line; a mistake of the user ends with one line on what to do, not with a traceback."""
-    from passiflex.cli import campaign_commands as _campaign_commands  # noqa: F401 - registers its commands
-    from passiflex.cli import commands as _commands  # noqa: F401
-    from passiflex.cli.terminal import app
     from passiflex.errors import PassiflexError
 
     try:
-        status = app(sys.argv[1:], result_action="return_value")
+        status = application()(sys.argv[1:], result_action="return_value")
     except PassiflexError as error:
         print(f"passiflex: {error}", file=sys.stderr)
         sys.exit(2)
