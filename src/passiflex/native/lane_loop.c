@@ -10,7 +10,8 @@
  * a lane that has finished its period waits for the others.
  * out receives, at every record_every-th sample, the numbers `kept` of (x, quad, c, command in force, z,
  * truth, row). Nothing is allocated here. A lane whose y leaves the finite numbers goes on as it is, and
- * disturbs no other; completed[lane] is the sample at which that happened, else n_rows. */
+ * disturbs no other; completed[lane] is the sample at which that happened, else n_rows; whole[lane] is how
+ * many recorded samples came before the first of which any number, kept or not, is not finite. */
 typedef struct {
     long long first, n_rows, steps, record_every, n_changes, n_kept;
     double period;
@@ -23,10 +24,11 @@ typedef struct {
     const lanes *p_plant, *p_control;
     const long long* kept;
     lanes* out;
-    long long* completed;
+    long long *completed, *whole;
 } passiflex_lane_run;
 
-enum { N_Y = N_X + N_Q, ENTRY = 1 + N_U, LINE = 1 + N_U + LONGEST_LINE * ENTRY };
+enum { N_Y = N_X + N_Q, ENTRY = 1 + N_U, LINE = 1 + N_U + LONGEST_LINE * ENTRY,
+       N_SEEN = N_Y + N_C + N_U + N_Z + N_TRUTH + N_W };
 
 /* One lane's way through a period: where it is, and the equal steps to the next arrival. */
 typedef struct {
@@ -123,10 +125,10 @@ LANE_EXPORT int passiflex_lanes(void) { return LANES; }
 LANE_EXPORT void passiflex_lane_loop(const passiflex_lane_run* r)
 {
     lanes next[N_C], command[N_U], said[N_Z], row[N_W], time, input[N_U + N_S];
-    lanes seen[N_Y + N_C + N_U + N_Z + N_TRUTH + N_W];
+    lanes seen[N_SEEN], none = all_lanes(0.0); /* NaN once a number was not finite */
     const long long* change = r->changes;
     lanes* out = r->out;
-    EACH_LANE r->completed[l] = r->n_rows;
+    EACH_LANE r->completed[l] = r->n_rows, r->whole[l] = 0;
     for (long long k = 0; k < r->n_rows; k++) {
         const double* timing = r->timing + k * 2 * LANES;
         lane_bits runs;
@@ -153,6 +155,8 @@ LANE_EXPORT void passiflex_lane_loop(const passiflex_lane_run* r)
             TRUTH(r->y, input, row, r->p_control, s), s += N_TRUTH;
             memcpy(s, row, N_W * sizeof(lanes));
             for (long long i = 0; i < r->n_kept; i++) *out++ = seen[r->kept[i]];
+            for (int i = 0; i < N_SEEN; i++) none += 0.0 * seen[i];
+            EACH_LANE r->whole[l] += LANE(none, l) == 0.0;
         }
         if (k >= r->steps) break;
         lane_period(r, input);

@@ -46,10 +46,19 @@ class LaneState(NamedTuple):
 
 
 class LaneSamples(NamedTuple):
-    """Recorded samples (rows, kept, lanes), how many samples each lane did while it was finite, the state after."""
+    """The samples of a stretch.
+
+    Attributes
+    ----------
+    values: What was kept (rows, kept, lanes).
+    completed: For each lane the sample at which its state ceased to be finite, or the number of samples.
+    whole: For each lane the rows before the first of which any number, kept or not, is not finite.
+    state: After the stretch.
+    """
 
     values: Array
     completed: NDArray[np.int64]
+    whole: NDArray[np.int64]
     state: LaneState
 
 
@@ -78,7 +87,7 @@ class _Run(ctypes.Structure):
             (name, ctypes.c_void_p)
             for name in (
                 "y", "c", "told", "z", "line", "longest", "changes", "told_values", "drawn", "timing",
-                "p_plant", "p_control", "kept", "out", "completed",
+                "p_plant", "p_control", "kept", "out", "completed", "whole",
             )
         ),
     )  # fmt: skip
@@ -232,15 +241,15 @@ class LaneLoop:
             told[i] = _aligned("told in a change", c.told, (self.n_told,))
         when = np.array([(c.period, c.lane, i) for i, c in enumerate(changes)], dtype=np.int64)
         kept = np.ascontiguousarray(kept, dtype=np.int64)
-        completed = np.zeros(w, dtype=np.int64)
+        completed, whole = np.zeros(w, dtype=np.int64), np.zeros(w, dtype=np.int64)
         run = _Run(
             inputs.first, n, n - last, record_every, len(changes), kept.size, period,
             changes=address(when), told_values=address(told), kept=address(kept),
-            completed=address(completed), **{name: address(a) for name, a in arrays.items()},
+            completed=address(completed), whole=address(whole), **{name: address(a) for name, a in arrays.items()},
         )  # fmt: skip
         self._routine(ctypes.byref(run))
         after = LaneState(*(arrays[name] for name in ("y", "c", "z", "line", "told")))
-        return LaneSamples(arrays["out"], completed, after)
+        return LaneSamples(arrays["out"], completed, whole, after)
 
     def _source(self, f: LaneFunctions, width: int | None) -> str:
         sizes = {

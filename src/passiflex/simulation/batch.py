@@ -171,7 +171,7 @@ def _advance(
     told = [orders(p, compiled.loop.period) for p in filled]
     chances = [Chance(p, compiled.loop.period) for p in filled]
     samples, piece = sample_count(problems[0]), max(1, PIECE // every) * every
-    ended = np.full(lanes.width, samples)
+    ended, whole = np.full(lanes.width, samples), np.zeros(lanes.width, dtype=np.int64)
     values = np.full((len(problems), -(-samples // every), columns.size), np.nan)
     for first in range(0, samples, piece):
         count = min(piece, samples - first)
@@ -193,12 +193,13 @@ def _advance(
         state = done.state
         begin = first // every
         values[:, begin : begin + len(done.values)] = done.values.transpose(2, 0, 1)[: len(problems)]
+        whole += np.where(whole == begin, done.whole, 0)
         left = (done.completed < count) & (ended == samples)
         ended[left] = first + done.completed[left]
         if (ended < samples).all():
             break
     return [
-        _recording(p, values[lane], shapes, int(ended[lane]), samples, every)
+        _recording(p, values[lane], shapes, int(ended[lane]), int(whole[lane]), samples)
         for lane, p in enumerate(problems)
     ]
 
@@ -238,12 +239,14 @@ def _recording(
     values: Array,
     shapes: dict[str, tuple[slice, tuple[int, ...]]],
     ended: int,
+    whole: int,
     samples: int,
-    every: int,
 ) -> Recording:
+    """Return what was kept of one lane; energies may leave the finite numbers before states do."""
     s = problem.sampling
     assert s is not None
-    count = len(values) if ended == samples else ended // every + 1
+    every = round(problem.output_interval / s.period)
+    count = len(values) if ended == samples else max(1, min(whole, ended // every + 1))
     signals = {
         name: values[:count, columns].reshape(count, *shape) for name, (columns, shape) in shapes.items()
     }

@@ -132,11 +132,19 @@ def _assemble(problem: Problem, compiled: CompiledSampledLoop, seen: list[Array]
     x, _, _, command, _, rows = seen
     felt = slice(0, SURROUNDINGS.size)
     truth = np.asarray(compiled.outputs.map(x, command, rows[:, felt], s.numbers), dtype=float)
+    everything = [*seen[:-1], truth, rows]
+    count = _whole_rows(everything) if failure else len(x)
     recorded = []
-    for (name, layout), numbers in zip(parts.items(), [*seen[:-1], truth, rows], strict=True):
+    for (name, layout), numbers in zip(parts.items(), everything, strict=True):
         kept = reported(name, layout)
         columns = np.hstack([np.arange(layout.size)[layout.slices[f.name]] for f in kept])
-        recorded.append(Rows(kept, numbers[:, columns]))
+        recorded.append(Rows(kept, numbers[:count, columns]))
     every = round(problem.output_interval / s.period)
-    time: Array = np.arange(len(x), dtype=np.float64) * (s.period * every)
+    time: Array = np.arange(count, dtype=np.float64) * (s.period * every)
     return assemble(problem, time, recorded, [], failure)
+
+
+def _whole_rows(parts: list[Array]) -> int:
+    """Return how many rows come before the first with a number that is not finite: energies overflow before states."""
+    good = np.all([np.isfinite(part).all(axis=1) for part in parts], axis=0)
+    return len(good) if good.all() else max(1, int(np.argmin(good)))
