@@ -19,11 +19,13 @@ def settling_time(
 ) -> float:
     """Return the time from the step until the response stays within `band` of it [s].
 
-    Infinite if it does not settle before `end`, or has no samples there.
+    Infinite if it does not settle before `end`, has no samples there, or ends before: where not even one
+    more row would have had its place.
     """
     window = np.flatnonzero((time >= begin) & (time < end))
+    whole = time[-1] >= end - 1e-9 or 2 * time[-1] - time[-2:][0] > end + 1e-9
     outside = window[np.abs(displacement[window] / step - 1) > band]
-    if not window.size or not time[-1] >= end - 1e-9 or (outside.size and outside[-1] == window[-1]):
+    if not window.size or not whole or (outside.size and outside[-1] == window[-1]):
         return float("inf")
     return float(time[outside[-1] + 1] - begin) if outside.size else 0.0
 

@@ -27,7 +27,11 @@ def step_window(scenario: Scenario) -> StepWindow | None:
     step = next((e for e in scenario.reference if isinstance(e, Step) and any(e.by)), None)
     if step is None:
         return None
-    times = [e.at for e in scenario.reference] + [t for f in scenario.forces for t in (f.start, f.end)]
+    times = [e.at for e in scenario.reference] + [
+        t for c in scenario.gains for t in (c.at, c.at + c.duration)
+    ]
+    for entries in (scenario.forces, scenario.feedforward, scenario.drags):
+        times += [t for entry in entries for t in (entry.start, entry.end)]
     size = float(np.linalg.norm(step.by))
     end = min([t for t in times if t > step.at] + [scenario.duration])
     return StepWindow(size, np.array(step.by) / size, step.at, end)
@@ -48,10 +52,10 @@ def step_numbers(time: Array, motion: Array, ideal: Array, window: StepWindow) -
     ideal: Displacement of the ideal, (N, 3) m or longer.
     """
     start = max(int(np.searchsorted(time, window.begin)) - 1, 0)
-    along = motion @ window.direction
+    along, wanted = motion @ window.direction, ideal[: time.size] @ window.direction
     moved = along - along[start]  # from where the step finds the robot
     inside = (time >= window.begin) & (time < window.end)
-    away = moved - ideal[: time.size] @ window.direction
+    away = moved - (wanted - wanted[start])  # the ideal, too, may have been moved before
     return {
         "overshoot": overshoot(time, moved, window.size, window.begin, window.end),
         "settling_time": settling_time(time, moved, window.size, window.begin, window.end),
