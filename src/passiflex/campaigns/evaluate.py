@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Callable, Sequence
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -16,9 +17,16 @@ from passiflex.campaigns.campaign_file import parse_campaign
 from passiflex.campaigns.draws import columns, draws, words
 from passiflex.campaigns.measures import MEASURES, SIGNALS, measures
 from passiflex.campaigns.samples import sample_scenario
-from passiflex.errors import NameUnknownError, PassiflexError, ValueRangeError
+from passiflex.errors import (
+    NameUnknownError,
+    PassiflexError,
+    PassiflexWarning,
+    SimulationError,
+    ValueRangeError,
+)
 from passiflex.passivity.ledger import Signals
 from passiflex.pieces.manifest import load_manifest
+from passiflex.pieces.source import source_digest
 from passiflex.responses.steps import displacement, step_window
 from passiflex.simulation import Run, Scenario, resolve, simulate_problem
 from passiflex.simulation.batch import digest_batch, simulate_in_lane
@@ -27,6 +35,10 @@ from passiflex.simulation.problem import Problem
 REFUSED = "refused"
 """Verdict of a sample that is no possible robot or scenario: it was not run, and `failure` says why."""
 TEXTS = ("verdict", "decided_by", "failure")
+CANNOT_RUN = (SimulationError, ValueRangeError)
+"""What is raised for a problem that cannot be integrated, as one with a pole beyond all bounds."""
+Digest = Callable[[int, Signals], dict[str, Any]]
+"""What is made of the number and the signals of a problem."""
 
 
 def evaluate_samples(text: str, samples: Sequence[int]) -> list[dict[str, Any]]:
@@ -55,7 +67,12 @@ def evaluate_samples(text: str, samples: Sequence[int]) -> list[dict[str, Any]]:
         measured = measures(problem, step_window(scenario), run)
         return {name: measured[name] for name in kept} | _kept_response(campaign, run)
 
-    for (i, *_), measured in zip(ready, _digested([p for *_, p in ready], row), strict=True):
+    problems = [p for *_, p in ready]
+    try:
+        done = _digested(problems, row)
+    except CANNOT_RUN:  # one that cannot be run must not take the others with it: each alone
+        done = [_alone(campaign, p, partial(row, k)) for k, p in enumerate(problems)]
+    for (i, *_), measured in zip(ready, done, strict=True):
         rows[i] |= measured
     return [rows[i] for i in samples]
 
@@ -81,8 +98,15 @@ def kept_measures(campaign: Campaign) -> tuple[str, ...]:
 
 
 def require_response(campaign: Campaign) -> None:
-    """Raise ValueRangeError unless the interval of the response fits the rows of the scenario."""
+    """Raise ValueRangeError unless the interval of the response fits the rows, which all samples have alike."""
     interval, step = campaign.keep.response, campaign.scenario.output_interval
+    varied = sorted({"duration", "output_interval"} & set(campaign.parameters))
+    if interval is not None and varied:
+        raise ValueRangeError(
+            "keep.response",
+            got=f"{' and '.join(varied)} among the parameters",
+            needs="rows at the same instants in all samples",
+        )
     if interval is not None and abs(interval / step - round(interval / step)) > 1e-9 * interval / step:
         raise ValueRangeError(
             "keep.response", got=f"{interval:g} s", needs=f"a whole multiple of output_interval, {step:g} s"
@@ -97,7 +121,15 @@ def replay(folder: str | Path, sample: int) -> Run:
     FolderError, ValueRangeError
         If the folder holds no campaign, or it has no such sample.
     """
-    return run_sample(_campaign(load_manifest(Path(folder)).campaign), sample)
+    manifest = load_manifest(Path(folder))
+    if manifest.source != source_digest():
+        warnings.warn(
+            f"the rows in {folder} are from version {manifest.version}, commit {manifest.commit}, and not from "
+            "this source: the run may have other numbers",
+            PassiflexWarning,
+            stacklevel=2,
+        )
+    return run_sample(_campaign(manifest.campaign), sample)
 
 
 def run_sample(campaign: Campaign, sample: int) -> Run:
@@ -106,9 +138,7 @@ def run_sample(campaign: Campaign, sample: int) -> Run:
     return simulate_in_lane(problem) if problem.sampling else simulate_problem(problem)
 
 
-def _digested(
-    problems: Sequence[Problem], digest: Callable[[int, Signals], dict[str, Any]]
-) -> list[dict[str, Any]]:
+def _digested(problems: Sequence[Problem], digest: Digest) -> list[dict[str, Any]]:
     """Return what `digest` makes of the number and the signals of each problem, side by side where they are sampled."""
     sampled = [k for k, p in enumerate(problems) if p.sampling]
     done = dict(
@@ -121,10 +151,19 @@ def _digested(
     return [done[k] if k in done else digest(k, simulate_problem(p)) for k, p in enumerate(problems)]
 
 
+def _alone(
+    campaign: Campaign, problem: Problem, digest: Callable[[Signals], dict[str, Any]]
+) -> dict[str, Any]:
+    try:
+        return _digested([problem], lambda _, run: digest(run))[0]
+    except CANNOT_RUN as error:
+        return _refused(campaign, str(error))
+
+
 def _refused(campaign: Campaign, why: str) -> dict[str, Any]:
     numbers = dict.fromkeys(kept_measures(campaign), math.nan)
     texts = {"verdict": REFUSED, "decided_by": "", "failure": why}
-    return texts | numbers | dict.fromkeys(_response_names(campaign), _padded(campaign, np.zeros(0)))
+    return texts | numbers | {name: _padded(campaign, np.zeros(0)) for name in _response_names(campaign)}
 
 
 def _kept_response(campaign: Campaign, run: Signals) -> dict[str, list[float]]:

@@ -40,7 +40,9 @@ MEASURES = {
     "margin": Measure("J", "low", "least of what law and motors may still give to the links"),
     "overdraft": Measure("J", "high", "largest energy given beyond what was there"),
     "decided_at": Measure("s", "low", "when the verdict was decided"),
-    "claimed_beyond_true": Measure("J", "high", "most that the law's books claim beyond what is there"),
+    "claimed_beyond_true": Measure(
+        "J", "high", "most that the tank claims beyond what is there; in continuous time, error of the law's books"
+    ),
     "integration_error": Measure("J", "high", "largest residual of the links' balance"),
     **{name: Measure("J", "high", f"at the end, {text}") for name, text in ENERGIES.items()},
     "tank_energy_end": Measure("J", "low", "level of the tank at the end"),
@@ -133,7 +135,7 @@ def _ideal(problem: Problem, count: int) -> Array:
     moving = [e for e in problem.events if e.motion is not None]
     key = (
         inertia.tobytes(), stiffness.tobytes(), damping.tobytes(), problem.output_interval, count,
-        *(e.time for e in problem.events), *(e.F_e.tobytes() for e in problem.events),
+        *((e.time, e.motion is not None, e.F_e.tobytes()) for e in problem.events),
         *(np.asarray(v).tobytes() for e in moving if e.motion for v in e.motion.values()),
     )  # fmt: skip
     if key not in _ideals:

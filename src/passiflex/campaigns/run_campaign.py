@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 import pyarrow as pa
 import yaml
 
@@ -15,7 +17,8 @@ from passiflex.campaigns.campaign_file import parse_campaign
 from passiflex.campaigns.evaluate import evaluate_samples, kept_measures, require_response, run_sample
 from passiflex.campaigns.measures import MEASURES
 from passiflex.campaigns.possible import require_possible
-from passiflex.errors import ValueRangeError
+from passiflex.errors import NameUnknownError, ValueRangeError
+from passiflex.native import find_compiler
 from passiflex.pieces.cluster import Cluster
 from passiflex.pieces.engines import Engine, InProcess, LocalProcesses
 from passiflex.pieces.manifest import load_manifest
@@ -60,7 +63,11 @@ class Results:
         """
         folder = Path(folder)
         campaign = parse_campaign(load_manifest(folder).campaign, source=str(folder))
-        return cls(folder, campaign, tuple(sorted((folder / RUNS).glob("*.nc"))))
+        found, kept = cls(folder, campaign), set((folder / RUNS).glob("sample_*.nc"))
+        if not kept or campaign.keep.by is None:
+            return found
+        ranked = [_run_file(folder, i) for i in worst(found, campaign.keep.by, campaign.samples)]
+        return cls(folder, campaign, tuple(path for path in ranked if path in kept))
 
 
 def run_campaign(
@@ -90,11 +97,11 @@ def run_campaign(
         campaign = parse_campaign(_with_samples(campaign, samples), source="campaign")
     kept_measures(campaign)
     require_response(campaign)
-    require_possible(campaign)
-    _require_stable(campaign)
-    with _engine(workers, scheduler) as engine:
+    with _engine(workers, scheduler) as engine:  # first, as a scheduler that is not there is soon found out
+        require_possible(campaign)
+        robot = _ready(campaign)
         prefix = campaign.sampling != "latin_hypercube"
-        text, identity = campaign.to_yaml(), _with_samples(campaign, None)
+        text, identity = campaign.to_yaml(), f"{_with_samples(campaign, None)}# robot: {robot}\n"
         with open_store(folder, text, campaign.samples, extends=prefix, identity=identity) as store:
             run_pieces(store, evaluate_samples, engine, on_progress)
     results = Results(Path(folder), campaign)
@@ -104,10 +111,17 @@ def run_campaign(
 def worst(results: Results, measure: str, count: int) -> list[int]:
     """Return the numbers of the samples that are worst by a measure, the worst first.
 
-    Samples whose run left the finite numbers come before all others, the earliest first; refused ones and
-    those where the measure is no number are left out.
+    Samples whose run left the finite numbers come before all others; refused ones and those where the
+    measure is no number are left out.
+
+    Raises
+    ------
+    NameUnknownError
+        If it is no measure, or none that the campaign keeps.
     """
     table = results.rows()
+    if measure not in (kept := [name for name in MEASURES if name in table.column_names]):
+        raise NameUnknownError("metric", measure, kept)
     values, ends = table[measure].to_pylist(), table["failure"].to_pylist()
     sign = 1.0 if MEASURES[measure].worst == "low" else -1.0
     found = [
@@ -127,13 +141,17 @@ def _keep_worst(results: Results) -> tuple[Path, ...]:
     folder = results.folder / RUNS
     paths = []
     for i in worst(results, keep.by, keep.worst):
-        path = folder / f"sample_{i}.nc"
+        path = _run_file(results.folder, i)
         if not path.exists():
             run_sample(results.campaign, i).save(path)
         paths.append(path)
     for other in set(folder.glob("sample_*.nc")) - set(paths):  # an extended campaign has other worst samples
         other.unlink()
     return tuple(paths)
+
+
+def _run_file(folder: Path, sample: int) -> Path:
+    return folder / RUNS / f"sample_{sample}.nc"
 
 
 def _engine(workers: int | None, scheduler: str | None) -> Engine:
@@ -144,12 +162,16 @@ def _engine(workers: int | None, scheduler: str | None) -> Engine:
     return InProcess() if workers == 0 else LocalProcesses(workers)
 
 
-def _require_stable(campaign: Campaign) -> None:
-    """Refuse a loop that is unstable before anything is drawn, and have its lanes compiled once for all workers."""
+def _ready(campaign: Campaign) -> str:
+    """Return a digest of the robot, after refusing an unstable loop and compiling the lanes once for all workers."""
     base = resolve(campaign.scenario)
     if base.sampling is not None:
         require_stable(base)
-        lane_loop(base)
+        if find_compiler() is not None:  # without one the samples run one by one
+            lane_loop(base)
+    robot = base.law.robot
+    numbers = [*robot.nominal().values(), robot.torque_limit, robot.velocity_limit, robot.position_limit]
+    return hashlib.sha256(b"".join(np.asarray(n, dtype=float).tobytes() for n in numbers)).hexdigest()[:16]
 
 
 def _with_samples(campaign: Campaign, samples: int | None) -> str:
