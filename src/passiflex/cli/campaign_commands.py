@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -83,7 +84,8 @@ def search(
     seed: Annotated[int, cyclopts.Parameter(help="seed of the search")] = 0,
 ) -> int:
     """Look for the worst case within the bounds of a campaign's parameters; what is found can be simulated."""
-    from passiflex.campaigns import load_campaign, search_worst
+    from passiflex.campaigns import load_campaign
+    from passiflex.campaigns.search import search as search_worst
     from passiflex.cli.campaign_tables import found_table
     from passiflex.files import require_writable
 
@@ -100,9 +102,20 @@ def search(
 
 def _sum_up(results: Results) -> None:
     """Print the statistics, and write them and the page of figures beside the rows."""
-    from passiflex.campaigns import statistics
+    from passiflex.campaigns.page import page
+    from passiflex.campaigns.statistics import statistics
     from passiflex.cli.campaign_tables import statistics_tables
+    from passiflex.files import whole_file
+    from passiflex.plotting.campaign import draw_campaign
+    from passiflex.plotting.figures import save_figure
 
-    found = statistics(results)
+    rows = results.rows()
+    found = statistics(results.campaign, rows)
     for table in statistics_tables(found):
         console.print(table)
+    with whole_file(results.folder / "statistics.json") as temporary:
+        temporary.write_text(json.dumps(found.to_dict(), indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    drawing = draw_campaign(page(results.campaign, rows, found))
+    written = [results.folder / "samples.parquet", results.folder / "statistics.json"]
+    for path in (*written, *save_figure(drawing, results.folder / "page"), *results.runs):
+        console.print(f"wrote {path}")

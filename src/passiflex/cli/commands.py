@@ -26,7 +26,7 @@ def reproduce(
         bool, cyclopts.Parameter(negative="", help="sweep what the paper does not print")
     ] = False,
 ) -> int:
-    """Reproduce the paper's figures, fig1, fig2, fig3 (all if none is named), or the study `sampled`.
+    """Reproduce the paper's figures, fig1, fig2, fig3 (all if none is named), or a study: sampled, uncertainty.
 
     Writes per figure a PNG, a PDF and the runs as netCDF, and one summary.json. With --sensitivity, one
     figure that shows how the conclusions move with what the paper does not print.

@@ -1,0 +1,194 @@
+"""The numbers of a campaign's page of figures, ready to be drawn."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from passiflex.campaigns.campaign import Campaign
+from passiflex.campaigns.evaluate import REFUSED
+from passiflex.campaigns.importance import Association
+from passiflex.campaigns.intervals import Share
+from passiflex.campaigns.measures import MEASURES
+from passiflex.campaigns.statistics import Statistics, drawn_columns, numbers_of
+from passiflex.responses.steps import step_window
+
+Array = NDArray[np.float64]
+
+DISTRIBUTIONS = ("margin", "overshoot", "settling_time", "torque_share")
+"""Metrics whose distributions are drawn, of those that were kept."""
+AGAINST = "margin"
+"""The metric that the most important parameter is drawn against."""
+MOST_METRICS, MOST_COLUMNS = 3, 14
+"""Of the bars: metrics beside each other, and parameters below each other."""
+BESIDE = 0.25
+"""How far from the index of a word its points lie, at most."""
+GOLDEN = (5**0.5 - 1) / 2
+"""Multiples of it, without their whole parts, are evenly spread."""
+BAND = (0.05, 0.25, 0.5, 0.75, 0.95)
+
+
+class Ecdf(NamedTuple):
+    """An empirical distribution: the share of samples at or below each value.
+
+    Attributes
+    ----------
+    endless: Share of samples whose value is not finite; the curve ends that far below one, or above zero.
+    """
+
+    metric: str
+    unit: str
+    values: Array
+    shares: Array
+    endless: float
+
+
+class Band(NamedTuple):
+    """Displacement along the step [m] over time [s]: its quantiles (5, times) over the runs that still run."""
+
+    time: Array
+    quantiles: Array
+
+
+class Bars(NamedTuple):
+    """How much a metric hangs on some columns, which all bars share: −1 to 1, or 0 to 1 for words."""
+
+    metric: str
+    strengths: Array
+    signed: NDArray[np.bool_]
+    significant: NDArray[np.bool_]
+
+
+class Scatter(NamedTuple):
+    """A metric against one column; of words x is the index, and the points of a word lie beside each other."""
+
+    parameter: str
+    words: tuple[str, ...]
+    x: Array
+    metric: str
+    y: Array
+    verdicts: NDArray[np.str_]
+
+
+class Page(NamedTuple):
+    """What is drawn of a campaign.
+
+    Attributes
+    ----------
+    columns: Labels of the bars, the most important first.
+    chance: Largest p-value that counts as more than chance.
+    band, scatter: None where there is nothing to show.
+    """
+
+    title: str
+    conditions: str
+    shares: tuple[Share, ...]
+    distributions: tuple[Ecdf, ...]
+    band: Band | None
+    columns: tuple[str, ...]
+    bars: tuple[Bars, ...]
+    chance: float
+    scatter: Scatter | None
+
+
+def page(campaign: Campaign, rows: pa.Table, found: Statistics) -> Page:
+    """Return the page of a campaign's rows and their statistics."""
+    run = np.array([v != REFUSED for v in rows["verdict"].to_pylist()] if rows.num_rows else [], dtype=bool)
+    chance = 1 - found.level
+    columns, bars = _bars(campaign, found, chance)
+    return Page(
+        title=f"{campaign.name}: {found.samples} samples",
+        conditions=found.conditions,
+        shares=found.shares,
+        distributions=tuple(
+            _ecdf(name, numbers_of(rows, name)[run]) for name in DISTRIBUTIONS if name in rows.column_names
+        ),
+        band=_band(campaign, rows, run),
+        columns=columns,
+        bars=bars,
+        chance=chance,
+        scatter=_scatter(campaign, rows, run, found),
+    )
+
+
+def label(campaign: Campaign, parameter: str, joint: int | None = None) -> str:
+    """Return a short name of a parameter: its last part where that says which, and the joint."""
+    last = parameter.rpartition(".")[2]
+    others = [path for path in campaign.parameters if path != parameter]
+    clear = not last.isdigit() and all(path.rpartition(".")[2] != last for path in others)
+    name = last.replace("_", " ") if clear else parameter
+    return name if joint is None else f"{name}, joint {joint}"
+
+
+def _ecdf(name: str, values: Array) -> Ecdf:
+    known = values[~np.isnan(values)]
+    finite = np.sort(known[np.isfinite(known)])
+    below = int((known == -math.inf).sum())
+    shares = (below + np.arange(1, finite.size + 1)) / max(known.size, 1)
+    endless = 1 - finite.size / values.size if values.size else math.nan
+    return Ecdf(name, MEASURES[name].unit, finite, shares, endless)
+
+
+def _band(campaign: Campaign, rows: pa.Table, run: NDArray[np.bool_]) -> Band | None:
+    window, interval = step_window(campaign.scenario), campaign.keep.response
+    if window is None or interval is None or not run.any():
+        return None
+    moved = [np.array(rows[f"displacement_{axis}"].to_pylist(), dtype=float)[run] for axis in "xyz"]
+    along = np.einsum("a,aij->ij", window.direction, np.array(moved))
+    going = ~np.isnan(along).all(axis=0)
+    time = np.arange(along.shape[1]) * interval
+    return Band(time[going], np.nanquantile(along[:, going], BAND, axis=0))
+
+
+def _bars(campaign: Campaign, found: Statistics, chance: float) -> tuple[tuple[str, ...], tuple[Bars, ...]]:
+    by_metric: dict[str, dict[str, Association]] = {}
+    for a in found.associations:
+        by_metric.setdefault(a.metric, {})[a.column] = a
+    metrics = [m for m, of in by_metric.items() if any(math.isfinite(a.strength) for a in of.values())]
+    shown = {m: by_metric[m] for m in metrics[:MOST_METRICS]}
+    if not shown:
+        return (), ()
+    first = next(iter(shown.values()))
+    names = sorted(first, key=lambda c: -_strongest([of[c] for of in shown.values()]))[:MOST_COLUMNS]
+    bars = tuple(
+        Bars(
+            metric,
+            np.array([of[c].strength for c in names]),
+            np.array([of[c].test == "spearman" for c in names]),
+            np.array([of[c].adjusted <= chance for c in names]),
+        )
+        for metric, of in shown.items()
+    )
+    return tuple(label(campaign, first[c].parameter, first[c].joint) for c in names), bars
+
+
+def _strongest(of: Sequence[Association]) -> float:
+    return max((abs(a.strength) for a in of if math.isfinite(a.strength)), default=0.0)
+
+
+def _scatter(campaign: Campaign, rows: pa.Table, run: NDArray[np.bool_], found: Statistics) -> Scatter | None:
+    of = [a for a in found.associations if a.metric == AGAINST and math.isfinite(a.strength)]
+    if not of:
+        return None
+    best = max(of, key=lambda a: abs(a.strength))
+    column = next(c for c in drawn_columns(campaign, rows) if c.name == best.column)
+    quantity = campaign.targets[best.parameter].quantity
+    unit = f" [{quantity.unit}]" if quantity and quantity.unit not in ("", "1") else ""
+    return Scatter(
+        label(campaign, best.parameter, best.joint) + unit,
+        column.words,
+        column.values[run] + (_beside(int(run.sum())) if column.words else 0.0),
+        AGAINST,
+        numbers_of(rows, AGAINST)[run],
+        np.array(rows["verdict"].to_pylist())[run],
+    )
+
+
+def _beside(count: int) -> Array:
+    """Return even offsets, so that points of the same word do not hide each other."""
+    return np.array([BESIDE * (2 * (i * GOLDEN % 1) - 1) for i in range(count)])
