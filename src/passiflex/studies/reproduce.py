@@ -24,8 +24,10 @@ from passiflex.simulation.scenario import Circle, Step
 from passiflex.studies.paper import FIGURES, Case, Report, figure_cases
 from passiflex.studies.sampled import reproduce_sampled
 from passiflex.studies.summary import summarise
+from passiflex.studies.uncertainty import reproduce_uncertainty
 
-SAMPLED = "sampled"
+STUDIES = {"sampled": reproduce_sampled, "uncertainty": reproduce_uncertainty}
+"""Studies beyond the paper's figures."""
 TITLES = {
     "robot": "gravity: the robot's own compensation\n(as in the paper)",
     "static": "gravity in plant and law\n(static compensation by the law's model)",
@@ -37,7 +39,8 @@ def reproduce(
 ) -> dict[str, list[Path]]:
     """Run the given figures, and return what was written into `folder`, by figure.
 
-    The paper's three if none is given; `sampled` is the study of the sampled world.
+    The paper's three if none is given; `sampled` is the study of the sampled world, `uncertainty` that of a
+    thousand robots.
 
     Each figure gives a PNG, a PDF and its runs as netCDF; all give their part of `summary.json`, which
     keeps what earlier calls wrote about other figures of the same version.
@@ -48,14 +51,14 @@ def reproduce(
         For a figure that there is not.
     """
     for name in figures:
-        if name not in (*FIGURES, SAMPLED):
-            raise NameUnknownError("figure", name, (*FIGURES, SAMPLED))
+        if name not in (*FIGURES, *STUDIES):
+            raise NameUnknownError("figure", name, (*FIGURES, *STUDIES))
     require_writable(folder)
     written: dict[str, list[Path]] = {}
     summary: dict[str, Any] = {}
     for name in figures or FIGURES:
-        if name == SAMPLED:
-            written[name], numbers = reproduce_sampled(folder, report)
+        if name in STUDIES:
+            written[name], numbers = STUDIES[name](folder, report)
             summary |= numbers
             continue
         cases = list(figure_cases(name, report))
