@@ -79,7 +79,7 @@ class Statistics:
     def conditions(self) -> str:
         """Return what the numbers are of, and what the intervals take for granted."""
         text = f"{self.samples} samples, {self.sampling}; {self.refused} refused, in no other number"
-        held = f"{text}; intervals of {self.level:.4g} for independent samples"
+        held = f"{text}; intervals of {100 * self.level:.4g} % for independent samples"
         return held if self.sampling == "random" else f"{held}, rather too wide for these"
 
     def share(self, name: str) -> Share:

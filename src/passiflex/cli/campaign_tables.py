@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 
-from rich.table import Table
+from rich.markup import escape
+from rich.table import Column, Table
 
 from passiflex.campaigns.found import Found
 from passiflex.campaigns.importance import Association, Index
@@ -12,7 +13,7 @@ from passiflex.campaigns.measures import MEASURES
 from passiflex.campaigns.samples import Values
 from passiflex.campaigns.statistics import Statistics
 
-MOST = 8
+MOST = 5
 """Rows for each metric of what it hangs on."""
 MOST_VALUES = 12
 """Parameters of the worst that are listed; the files have them all."""
@@ -38,41 +39,38 @@ def share_table(found: Statistics) -> Table:
 
 
 def quantile_table(found: Statistics) -> Table:
-    """Return the quantiles of each metric, with the interval of the median."""
-    table = Table(
-        "metric", "5 %", "25 %", "median", _level(found), "75 %", "95 %", "not finite",
-        title="quantiles of the finite values",
+    """Return the quantiles of each metric, with the interval of the median; statistics.json has more of them."""
+    table = _table(
+        "metric", "5 %", "median", _level(found), "95 %", "none", title="quantiles of the finite values",
+        caption=f"{_level(found)}: of the median; none: samples without a finite value",
     )  # fmt: skip
     for spread in found.spreads:
+        none = str(spread.not_finite or "")
         if not spread.finite:
-            table.add_row(_named(spread.metric), *[""] * 6, str(spread.not_finite))
+            table.add_row(_named(spread.metric), *[""] * 4, none)
             continue
-        low, lower, median, upper, high = spread.quantiles
-        interval = f"{median.low:.3g} to {median.high:.3g}"
-        numbers = [f"{q.value:.4g}" for q in (low, lower, median)]
-        table.add_row(
-            _named(spread.metric), *numbers, interval, f"{upper.value:.4g}", f"{high.value:.4g}",
-            str(spread.not_finite or ""),
-        )  # fmt: skip
+        low, _, median, _, high = spread.quantiles
+        interval = f"{median.low:.2g} to {median.high:.2g}"
+        numbers = [f"{q.value:.3g}" for q in (low, median, high)]
+        table.add_row(_named(spread.metric), *numbers[:2], interval, numbers[2], none)
     return table
 
 
 def importance_table(found: Statistics, most: int = MOST) -> Table:
     """Return what each metric hangs on, the strongest first."""
-    table = Table(
-        "metric", "parameter", "joint", "rank correlation", "p, Holm", "first-order index", _level(found),
-        title="what matters",
-        caption="rank correlation: Spearman's; of words √(H/(n − 1)) by Kruskal and Wallis, without a sign",
+    table = _table(
+        "parameter, joint", "rank corr.", "p, Holm", "first order", title="what matters",
+        caption="rank correlation: Spearman's; of words √(H/(n − 1)) by Kruskal and Wallis, without a sign\n"
+        f"first order: share of the variance, with its {_level(found)}",
     )  # fmt: skip
     for metric in dict.fromkeys(a.metric for a in found.associations):
         of = [a for a in found.associations if a.metric == metric and not math.isnan(a.strength)]
         ranked = sorted(of, key=lambda a: -abs(a.strength))
-        for i, a in enumerate(ranked[:most]):
-            table.add_row(_named(metric) if i == 0 else "", *_association(a), end_section=i == len(of) - 1)
+        table.add_row(f"[bold]{_named(metric)}[/bold]" + ("" if ranked else ": nothing that varies"))
+        for a in ranked[:most]:
+            table.add_row(*_association(a))
         if len(ranked) > most:
-            table.add_row("", f"and {len(ranked) - most} that matter less", end_section=True)
-        if not ranked:
-            table.add_row(_named(metric), "nothing that varies", end_section=True)
+            table.add_row(f"  and {len(ranked) - most} that matter less")
     return table
 
 
@@ -99,13 +97,21 @@ def found_table(found: Found) -> Table:
     return table
 
 
+def _table(*columns: str, title: str, caption: str) -> Table:
+    """Return a narrow table whose cells stay on one line."""
+    return Table(
+        *(Column(c, no_wrap=True) for c in columns), title=title, caption=caption, box=None, pad_edge=False
+    )  # fmt: skip
+
+
 def _association(a: Association) -> list[str]:
-    strength = f"{a.strength:+.3f}" if a.test == "spearman" else f"{a.strength:.3f}"
-    return [a.parameter, str(a.joint or ""), strength, f"{a.adjusted:.2g}", *_index(a.first_order)]
+    name = f"  {a.parameter}" + (f", {a.joint}" if a.joint else "")
+    strength = f"{a.strength:+.2f}" if a.test == "spearman" else f"{a.strength:.2f}"
+    return [name, strength, f"{a.adjusted:.1g}", _index(a.first_order)]
 
 
-def _index(index: Index | None) -> list[str]:
-    return ["", ""] if index is None else [f"{index.value:.3f}", f"{index.low:.3f} to {index.high:.3f}"]
+def _index(index: Index | None) -> str:
+    return "" if index is None else f"{index.value:.2f} ({index.low:.2f} to {index.high:.2f})"
 
 
 def _listed(values: Values) -> str:
@@ -122,9 +128,9 @@ def _value(value: object) -> str:
 
 
 def _level(found: Statistics) -> str:
-    return f"{found.level:.4g} interval"
+    return f"{100 * found.level:.4g} % interval"
 
 
 def _named(metric: str) -> str:
     unit = MEASURES[metric].unit
-    return metric.replace("_", " ") + ("" if unit == "1" else f" [{unit}]")
+    return escape(metric.replace("_", " ") + ("" if unit == "1" else f" [{unit}]"))
