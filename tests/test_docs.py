@@ -18,7 +18,8 @@ EXAMPLES = ROOT / "docs" / "examples"
 FENCE = re.compile(r"^```(\w+)[^\n]*\n(.*?)^```", re.MULTILINE | re.DOTALL)
 SKIPPED = "<!-- no-run -->"
 ROOMS = (
-    "robots|phs|control|sampled|native|simulation|passivity|responses|limits|pieces|campaigns|plotting|studies|cli|errors|layout|files"
+    "robots|phs|control|sampled|native|simulation|passivity|responses|limits|pieces|campaigns|plotting|studies|cli"
+    "|errors|layout|files"
 )
 CODE_NAME = re.compile(rf"`((?:{ROOMS})(?:\.\w+)+)`")
 

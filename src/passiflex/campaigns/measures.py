@@ -41,7 +41,9 @@ MEASURES = {
     "overdraft": Measure("J", "high", "largest energy given beyond what was there"),
     "decided_at": Measure("s", "low", "when the verdict was decided"),
     "claimed_beyond_true": Measure(
-        "J", "high", "most that the tank claims beyond what is there; in continuous time, error of the law's books"
+        "J",
+        "high",
+        "most that the tank claims beyond what is there; in continuous time, error of the law's books",
     ),
     "integration_error": Measure("J", "high", "largest residual of the links' balance"),
     **{name: Measure("J", "high", f"at the end, {text}") for name, text in ENERGIES.items()},

@@ -73,8 +73,18 @@ class Cluster(Engine):
 
     @property
     def in_flight(self) -> int:
-        """Return two per thread of the workers that are there now."""
-        return 2 * max(1, sum(self._client.nthreads().values()))
+        """Return two per thread of the workers that are there now.
+
+        Raises
+        ------
+        EngineError
+            If the scheduler is lost.
+        """
+        try:
+            threads = sum(self._client.nthreads().values())
+        except (OSError, TimeoutError) as error:
+            raise EngineError("the scheduler is lost", got=str(error) or type(error).__name__) from error
+        return 2 * max(1, threads)
 
     def submit(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
         """Hand a call to the scheduler."""
