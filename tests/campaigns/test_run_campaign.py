@@ -390,3 +390,13 @@ def test_a_campaign_of_a_file(tmp_path: Path) -> None:
     (tmp_path / "s.yaml").unlink()
     assert same_rows(table(results), evaluate_samples(text, range(2)))
     assert has_numbers(replay(tmp_path / "out", 1), results, 1)
+
+
+def test_what_no_row_depends_on_may_change(tmp_path: Path) -> None:
+    """Description, and how many full runs are kept: the same rows, and the folder goes on."""
+    out = tmp_path / "out"
+    run_campaign(campaign(samples=4), out, workers=0)
+    before = (out / "samples.parquet").read_bytes()
+    more = campaign(samples=4, description="again", keep={"worst": 1, "by": "margin"})
+    assert len(run_campaign(more, out, workers=0).runs) == 1
+    assert (out / "samples.parquet").read_bytes() == before

@@ -242,7 +242,7 @@ def test_the_worst_samples_are_at_the_bad_end_and_diverged_ones_before_all() -> 
     assert found.worst[1].draws == {
         STIFFNESS: tuple(drawn[:2]), DAMPING: drawn[2], LOOP: ("plain", "matched")[int(drawn[3])],
     }  # fmt: skip
-    assert [w.sample for w in statistics(of, rows, by="overshoot", worst=2).worst] == [1, 4]
+    assert [w.sample for w in statistics(of, rows, by="overshoot", worst=2).worst] == [5, 1]
 
 
 @pytest.mark.parametrize("changes", [{"metrics": ["margn"]}, {"by": "overshoot"}])

@@ -238,3 +238,17 @@ def test_the_lines_of_a_sampled_campaign_name_it(shell: Shell, tmp_path: Path) -
     counted = ", ".join(f"{verdicts.count(v)} {v}" for v in sorted(set(verdicts)))
     assert result.out.splitlines()[0].endswith(f"left: {counted}")
     assert set(verdicts) == {"passive", "violated"}
+
+
+def test_an_interruption_is_one_line(
+    shell: Shell, small: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The framework of the command line would end without a word."""
+
+    def interrupted(*arguments: object, **more: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("passiflex.campaigns.run_campaign", interrupted)
+    result = shell("campaign", small, "--workers", 0, "--out", tmp_path / "out")
+    assert (result.status, result.out) == (130, "")
+    assert result.err == "passiflex: interrupted; nothing is half-written, and the same command goes on\n"

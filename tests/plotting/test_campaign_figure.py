@@ -26,6 +26,7 @@ from passiflex.plotting.figures import Curve, save_figure
 VALUES, SHARES = np.array([1.0, 2.0, 4.0]), np.array([0.25, 0.5, 0.75])
 TIME = np.array([0.0, 0.1, 0.2])
 QUANTILES = np.arange(15.0).reshape(5, 3)
+ROOTS = np.array([0.9, 0.2, np.nan])
 SIGNED = np.array([True, True, False])
 VERDICT_OF = np.array(["passive", "violated", "passive", "inconclusive"])
 
@@ -42,8 +43,8 @@ def made(**changes: Any) -> Page:
         "band": Band(TIME, QUANTILES),
         "columns": ("delay", "joint stiffness, joint 2", "inner loop"),
         "bars": (
-            Bars("margin", np.array([-0.8, 0.1, 0.5]), SIGNED, np.array([True, False, True])),
-            Bars("overshoot", np.array([0.3, np.nan, 0.1]), SIGNED, np.array([True, False, False])),
+            Bars("margin", np.array([-0.8, 0.1, 0.5]), SIGNED, np.array([True, False, True]), ROOTS),
+            Bars("overshoot", np.array([0.3, np.nan, 0.1]), SIGNED, np.array([True, False, False]), np.full(3, np.nan)),
         ),
         "chance": 0.05,
         "scatter": Scatter("delay [s]", (), np.arange(4.0), "margin", np.arange(4.0) ** 2, VERDICT_OF),
@@ -142,7 +143,7 @@ def test_words_are_written_below_their_points() -> None:
 def test_no_label_lies_on_another_or_off_the_page() -> None:
     columns = tuple(f"deviations.joint_stiffness, joint {i}" for i in range(14))
     bars = tuple(
-        Bars(m, np.linspace(1, 0.1, 14), np.ones(14, bool), np.ones(14, bool))
+        Bars(m, np.linspace(1, 0.1, 14), np.ones(14, bool), np.ones(14, bool), np.ones(14))
         for m in ("margin", "overshoot", "torque_share")
     )
     figure = draw_campaign(made(columns=columns, bars=bars))

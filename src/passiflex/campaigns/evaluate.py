@@ -16,6 +16,7 @@ from passiflex.campaigns.campaign import Campaign
 from passiflex.campaigns.campaign_file import parse_campaign
 from passiflex.campaigns.draws import columns, draws, words
 from passiflex.campaigns.measures import MEASURES, SIGNALS, measures
+from passiflex.campaigns.same_robot import require_same_robot
 from passiflex.campaigns.samples import sample_scenario
 from passiflex.errors import (
     NameUnknownError,
@@ -25,6 +26,7 @@ from passiflex.errors import (
     ValueRangeError,
 )
 from passiflex.passivity.ledger import Signals
+from passiflex.pieces.engines import usable_cores
 from passiflex.pieces.manifest import load_manifest
 from passiflex.pieces.source import source_digest
 from passiflex.responses.steps import displacement, step_window
@@ -45,8 +47,14 @@ def evaluate_samples(text: str, samples: Sequence[int]) -> list[dict[str, Any]]:
     """Return a row for each sample of the campaign of this text; nothing else has a part in it.
 
     A row has the draws, verdict, measures, and what is kept of the response.
+
+    Raises
+    ------
+    PassiflexError
+        If the robot cannot be read, or is another than the text is marked with: that is no refused sample.
     """
     campaign = _campaign(text)
+    require_same_robot(campaign, text)
     names = columns(campaign)
     drawn = draws(campaign, samples)
     known = words(campaign)
@@ -79,7 +87,9 @@ def evaluate_samples(text: str, samples: Sequence[int]) -> list[dict[str, Any]]:
 
 def evaluate_problems(problems: Sequence[Problem], scenarios: Sequence[Scenario]) -> list[dict[str, Any]]:
     """Return the measures of problems, run side by side."""
-    return _digested(problems, lambda k, run: measures(problems[k], step_window(scenarios[k]), run))
+    return _digested(
+        problems, lambda k, run: measures(problems[k], step_window(scenarios[k]), run), threads=usable_cores()
+    )
 
 
 def kept_measures(campaign: Campaign) -> tuple[str, ...]:
@@ -118,8 +128,8 @@ def replay(folder: str | Path, sample: int) -> Run:
 
     Raises
     ------
-    FolderError, ValueRangeError
-        If the folder holds no campaign, or it has no such sample.
+    FolderError, ValueRangeError, OtherRobotError
+        If the folder holds no campaign, or it has no such sample, or its robot has changed.
     """
     manifest = load_manifest(Path(folder))
     if manifest.source != source_digest():
@@ -129,7 +139,9 @@ def replay(folder: str | Path, sample: int) -> Run:
             PassiflexWarning,
             stacklevel=2,
         )
-    return run_sample(_campaign(manifest.campaign), sample)
+    campaign = _campaign(manifest.campaign)
+    require_same_robot(campaign, manifest.campaign)
+    return run_sample(campaign, sample)
 
 
 def run_sample(campaign: Campaign, sample: int) -> Run:
@@ -138,13 +150,18 @@ def run_sample(campaign: Campaign, sample: int) -> Run:
     return simulate_in_lane(problem) if problem.sampling else simulate_problem(problem)
 
 
-def _digested(problems: Sequence[Problem], digest: Digest) -> list[dict[str, Any]]:
+def _digested(problems: Sequence[Problem], digest: Digest, *, threads: int = 1) -> list[dict[str, Any]]:
     """Return what `digest` makes of the number and the signals of each problem, side by side where they are sampled."""
     sampled = [k for k, p in enumerate(problems) if p.sampling]
     done = dict(
         zip(
             sampled,
-            digest_batch([problems[k] for k in sampled], SIGNALS, lambda k, run: digest(sampled[k], run)),
+            digest_batch(
+                [problems[k] for k in sampled],
+                SIGNALS,
+                lambda k, run: digest(sampled[k], run),
+                threads=threads,
+            ),
             strict=True,
         )
     )

@@ -74,6 +74,12 @@ class Association(NamedTuple):
     samples: int
     first_order: Index | None
 
+    @property
+    def weight(self) -> float:
+        """Return how much it matters, 0 to 1: by ranks, or by the least first-order share, which sees bends too."""
+        by_rank = abs(self.strength) if math.isfinite(self.strength) else 0.0
+        return max(by_rank, math.sqrt(max(self.first_order.low, 0.0)) if self.first_order else 0.0)
+
 
 def associations(
     metric: str, values: Array, columns: list[Column], level: float, seed: int

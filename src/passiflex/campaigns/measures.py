@@ -58,7 +58,7 @@ MEASURES = {
     "tracking_rms": Measure("m", "high", "distance of the end effector from x_d"),
     "overshoot": Measure("1", "high", "beyond the step, as a share of it"),
     "settling_time": Measure("s", "high", "until the response stays within 2 % of the step"),
-    "offset_before_step": Measure("m", "high", "motion along the step before it"),
+    "offset_before_step": Measure("m", "high", "motion along the step before it, without its sign"),
     "rms_to_msd": Measure("1", "high", "distance to the ideal mass-spring-damper, as a share of the step"),
     "end_time": Measure("s", "low", "simulated time; shorter than the duration if the run ended early"),
 }
@@ -122,10 +122,12 @@ def _response(problem: Problem, window: StepWindow | None, run: Signals) -> dict
         return missing | {"settling_time": math.nan if window is None else math.inf}
     moved = displacement(run["position"])
     numbers = step_numbers(run.time, moved, _ideal(problem, len(run.time)), window)
+    numbers["offset_before_step"] = abs(numbers["offset_before_step"])
     changing = problem.sampling is not None and problem.sampling.gains
     return numbers | ({"rms_to_msd": math.nan} if changing else {})
 
 
+MOST_IDEALS = 64
 _ideals: dict[tuple[object, ...], Array] = {}
 
 
@@ -140,9 +142,12 @@ def _ideal(problem: Problem, count: int) -> Array:
         *((e.time, e.motion is not None, e.F_e.tobytes()) for e in problem.events),
         *(np.asarray(v).tobytes() for e in moving if e.motion for v in e.motion.values()),
     )  # fmt: skip
-    if key not in _ideals:
-        if len(_ideals) >= 64:
+    found = _ideals.get(key)  # another thread may forget it in the meantime
+    if found is None:
+        found = ideal_displacement(
+            inertia, stiffness, damping, problem.events, problem.output_interval, count
+        )
+        if len(_ideals) >= MOST_IDEALS:
             _ideals.clear()
-        interval = problem.output_interval
-        _ideals[key] = ideal_displacement(inertia, stiffness, damping, problem.events, interval, count)
-    return _ideals[key]
+        _ideals[key] = found
+    return found

@@ -12,11 +12,14 @@ from numpy.typing import NDArray
 
 from passiflex.campaigns.campaign import Campaign
 from passiflex.campaigns.evaluate import REFUSED
-from passiflex.campaigns.importance import Association
+from passiflex.campaigns.importance import Association, Index
 from passiflex.campaigns.intervals import Share
-from passiflex.campaigns.measures import MEASURES
+from passiflex.campaigns.measures import IDEAL_RATIO, MEASURES
 from passiflex.campaigns.statistics import Statistics, drawn_columns, numbers_of
+from passiflex.responses.closed_form import ideal_displacement
 from passiflex.responses.steps import step_window
+from passiflex.simulation import resolve
+from passiflex.simulation.gains import target_inertia
 
 Array = NDArray[np.float64]
 
@@ -62,6 +65,8 @@ class Bars(NamedTuple):
     strengths: Array
     signed: NDArray[np.bool_]
     significant: NDArray[np.bool_]
+    first_order: Array
+    """Square root of the share of the variance that hangs on the column alone; NaN where it cannot be had."""
 
 
 class Scatter(NamedTuple):
@@ -116,6 +121,21 @@ def page(campaign: Campaign, rows: pa.Table, found: Statistics) -> Page:
     )
 
 
+def ideal_along(campaign: Campaign) -> tuple[Array, Array] | None:
+    """Return time [s] and displacement [m] along the step of the ideal mass-spring-damper; None without a step."""
+    scenario, window = campaign.scenario, step_window(campaign.scenario)
+    if window is None:
+        return None
+    problem = resolve(scenario)
+    gains = problem.law.layout.unpack(problem.gains)
+    stiffness, damping = gains["stiffness"], gains["damping"]
+    inertia = target_inertia(stiffness, damping, IDEAL_RATIO)
+    interval = campaign.keep.response or scenario.output_interval
+    count = int(scenario.duration / interval + 1e-9) + 1
+    moved = ideal_displacement(inertia, stiffness, damping, problem.events, interval, count)
+    return np.arange(count, dtype=np.float64) * interval, moved @ window.direction
+
+
 def label(campaign: Campaign, parameter: str, joint: int | None = None) -> str:
     """Return a short name of a parameter: its last part where that says which, and the joint."""
     last = parameter.rpartition(".")[2]
@@ -161,6 +181,7 @@ def _bars(campaign: Campaign, found: Statistics, chance: float) -> tuple[tuple[s
             np.array([of[c].strength for c in names]),
             np.array([of[c].test == "spearman" for c in names]),
             np.array([of[c].adjusted <= chance for c in names]),
+            np.array([_root(of[c].first_order) for c in names]),
         )
         for metric, of in shown.items()
     )
@@ -168,14 +189,18 @@ def _bars(campaign: Campaign, found: Statistics, chance: float) -> tuple[tuple[s
 
 
 def _strongest(of: Sequence[Association]) -> float:
-    return max((abs(a.strength) for a in of if math.isfinite(a.strength)), default=0.0)
+    return max(a.weight for a in of)
+
+
+def _root(index: Index | None) -> float:
+    return math.nan if index is None else math.sqrt(max(index.value, 0.0))
 
 
 def _scatter(campaign: Campaign, rows: pa.Table, run: NDArray[np.bool_], found: Statistics) -> Scatter | None:
     of = [a for a in found.associations if a.metric == AGAINST and math.isfinite(a.strength)]
     if not of:
         return None
-    best = max(of, key=lambda a: abs(a.strength))
+    best = max(of, key=lambda a: a.weight)
     column = next(c for c in drawn_columns(campaign, rows) if c.name == best.column)
     quantity = campaign.targets[best.parameter].quantity
     unit = f" [{quantity.unit}]" if quantity and quantity.unit not in ("", "1") else ""

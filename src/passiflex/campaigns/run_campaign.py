@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
-import hashlib
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
 import pyarrow as pa
 import yaml
 
 from passiflex.campaigns.campaign import Campaign
 from passiflex.campaigns.campaign_file import parse_campaign
-from passiflex.campaigns.evaluate import evaluate_samples, kept_measures, require_response, run_sample
+from passiflex.campaigns.evaluate import (
+    REFUSED,
+    evaluate_samples,
+    kept_measures,
+    require_response,
+    run_sample,
+)
 from passiflex.campaigns.measures import MEASURES
 from passiflex.campaigns.possible import require_possible
+from passiflex.campaigns.ranking import worst_first
+from passiflex.campaigns.same_robot import marked, robot_digest
 from passiflex.errors import NameUnknownError, ValueRangeError
 from passiflex.native import find_compiler
 from passiflex.pieces.cluster import Cluster
@@ -101,18 +106,17 @@ def run_campaign(
         require_possible(campaign)
         robot = _ready(campaign)
         prefix = campaign.sampling != "latin_hypercube"
-        text, identity = campaign.to_yaml(), f"{_with_samples(campaign, None)}# robot: {robot}\n"
+        text, identity = marked(campaign.to_yaml(), robot), marked(_identity(campaign), robot)
         with open_store(folder, text, campaign.samples, extends=prefix, identity=identity) as store:
             run_pieces(store, evaluate_samples, engine, on_progress)
-    results = Results(Path(folder), campaign)
-    return Results(results.folder, campaign, _keep_worst(results))
+            results = Results(Path(folder), campaign)
+            return Results(results.folder, campaign, _keep_worst(results))
 
 
 def worst(results: Results, measure: str, count: int) -> list[int]:
     """Return the numbers of the samples that are worst by a measure, the worst first.
 
-    Samples whose run left the finite numbers come before all others; refused ones and those where the
-    measure is no number are left out.
+    As `worst_first` ranks them; refused ones are left out.
 
     Raises
     ------
@@ -122,16 +126,11 @@ def worst(results: Results, measure: str, count: int) -> list[int]:
     table = results.rows()
     if measure not in (kept := [name for name in MEASURES if name in table.column_names]):
         raise NameUnknownError("metric", measure, kept)
-    values, ends = table[measure].to_pylist(), table["failure"].to_pylist()
-    sign = 1.0 if MEASURES[measure].worst == "low" else -1.0
-    found = [
-        (not failure, sign * value, i)
-        for i, (value, failure, verdict) in enumerate(
-            zip(values, ends, table["verdict"].to_pylist(), strict=True)
-        )
-        if verdict != "refused" and value is not None and not math.isnan(value)
-    ]
-    return [i for *_, i in sorted(found)[:count]]
+    rows = [i for i, verdict in enumerate(table["verdict"].to_pylist()) if verdict != REFUSED]
+    run = table.take(rows)
+    ranked = worst_first(measure, run[measure].to_pylist(), run["failure"].to_pylist())
+    samples = run["sample"].to_pylist()
+    return [samples[i] for i in ranked[:count]]
 
 
 def _keep_worst(results: Results) -> tuple[Path, ...]:
@@ -163,21 +162,25 @@ def _engine(workers: int | None, scheduler: str | None) -> Engine:
 
 
 def _ready(campaign: Campaign) -> str:
-    """Return a digest of the robot, after refusing an unstable loop and compiling the lanes once for all workers."""
+    """Return the robot's digest, after refusing an unstable loop and compiling the lanes once for all workers."""
     base = resolve(campaign.scenario)
     if base.sampling is not None:
         require_stable(base)
         if find_compiler() is not None:  # without one the samples run one by one
             lane_loop(base)
-    robot = base.law.robot
-    numbers = [*robot.nominal().values(), robot.torque_limit, robot.velocity_limit, robot.position_limit]
-    return hashlib.sha256(b"".join(np.asarray(n, dtype=float).tobytes() for n in numbers)).hexdigest()[:16]
+    return robot_digest(campaign)
 
 
-def _with_samples(campaign: Campaign, samples: int | None) -> str:
-    """Return the campaign's text with another number of samples, or without any."""
+def _with_samples(campaign: Campaign, samples: int) -> str:
+    """Return the campaign's text with another number of samples."""
+    return yaml.safe_dump(yaml.safe_load(campaign.to_yaml()) | {"samples": samples}, sort_keys=False)
+
+
+def _identity(campaign: Campaign) -> str:
+    """Return the text of what rows depend on: all but how many there are, and of which a full run is kept."""
     data = yaml.safe_load(campaign.to_yaml())
-    data.pop("samples")
-    if samples is not None:
-        data["samples"] = samples
+    for name in ("samples", "description"):
+        data.pop(name, None)
+    for name in ("worst", "by"):
+        data.get("keep", {}).pop(name, None)
     return yaml.safe_dump(data, sort_keys=False, allow_unicode=True)

@@ -17,6 +17,7 @@ from passiflex.campaigns.evaluate import REFUSED
 from passiflex.campaigns.importance import Association, Column, associations
 from passiflex.campaigns.intervals import Quantile, Share, quantile_of, require_level, share_of
 from passiflex.campaigns.measures import MEASURES
+from passiflex.campaigns.ranking import worst_first
 from passiflex.campaigns.samples import Values
 from passiflex.errors import NameUnknownError
 from passiflex.responses.steps import step_window
@@ -220,16 +221,11 @@ def _spread(name: str, values: Array, level: float) -> Spread:
 def _worst(
     rows: pa.Table, run: NDArray[np.bool_], values: Array, drawn: list[Column], by: str, count: int
 ) -> list[WorstSample]:
-    """Return the worst first, runs that left the finite numbers before all others; of equals, the earlier sample."""
-    sign = 1.0 if MEASURES[by].worst == "low" else -1.0
+    """Return the worst first, as `worst_first` ranks them."""
     which = np.flatnonzero(run)
     verdicts, failures = (rows[name].to_pylist() for name in ("verdict", "failure"))
     index = rows["sample"].to_pylist()
-    ranked = sorted(
-        (not failures[which[i]], sign * value, i)
-        for i, value in enumerate(values.tolist())
-        if not math.isnan(value)
-    )
+    ranked = worst_first(by, values.tolist(), [failures[k] for k in which])
     return [
         WorstSample(
             index[which[i]],
@@ -237,7 +233,7 @@ def _worst(
             verdicts[which[i]],
             _drawn(drawn, i),
         )
-        for *_, i in ranked[:count]
+        for i in ranked[:count]
     ]
 
 

@@ -102,12 +102,12 @@ def search(
 
 def _sum_up(results: Results) -> None:
     """Print the statistics, and write them and the page of figures beside the rows."""
-    from passiflex.campaigns.page import page
+    from passiflex.campaigns.page import ideal_along, page
     from passiflex.campaigns.statistics import statistics
     from passiflex.cli.campaign_tables import statistics_tables
     from passiflex.files import whole_file
     from passiflex.plotting.campaign import draw_campaign
-    from passiflex.plotting.figures import save_figure
+    from passiflex.plotting.figures import Curve, save_figure
 
     rows = results.rows()
     found = statistics(results.campaign, rows)
@@ -115,7 +115,8 @@ def _sum_up(results: Results) -> None:
         console.print(table)
     with whole_file(results.folder / "statistics.json") as temporary:
         temporary.write_text(json.dumps(found.to_dict(), indent=2, allow_nan=False) + "\n", encoding="utf-8")
-    drawing = draw_campaign(page(results.campaign, rows, found))
+    ideal = ideal_along(results.campaign)
+    drawing = draw_campaign(page(results.campaign, rows, found), {"msd": Curve(*ideal)} if ideal else {})
     written = [results.folder / "samples.parquet", results.folder / "statistics.json"]
     for path in (*written, *save_figure(drawing, results.folder / "page"), *results.runs):
         console.print(f"wrote {path}")

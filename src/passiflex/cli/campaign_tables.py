@@ -65,7 +65,7 @@ def importance_table(found: Statistics, most: int = MOST) -> Table:
     )  # fmt: skip
     for metric in dict.fromkeys(a.metric for a in found.associations):
         of = [a for a in found.associations if a.metric == metric and not math.isnan(a.strength)]
-        ranked = sorted(of, key=lambda a: -abs(a.strength))
+        ranked = sorted(of, key=lambda a: -a.weight)
         table.add_row(f"[bold]{_named(metric)}[/bold]" + ("" if ranked else ": nothing that varies"))
         for a in ranked[:most]:
             table.add_row(*_association(a))
@@ -76,7 +76,8 @@ def importance_table(found: Statistics, most: int = MOST) -> Table:
 
 def worst_table(found: Statistics) -> Table:
     """Return the worst samples with what was drawn for them."""
-    table = Table("sample", _named(found.by), "verdict", "drawn", title=f"the worst by {found.by}")
+    drawn = Column("drawn", overflow="fold")
+    table = Table("sample", _named(found.by), "verdict", drawn, title=f"the worst by {found.by}")
     for worst in found.worst:
         table.add_row(str(worst.sample), f"{worst.value:.5g}", worst.verdict, _listed(worst.draws))
     return table
@@ -86,7 +87,7 @@ def found_table(found: Found) -> Table:
     """Return the worst cases of a search."""
     refused = f", {found.refused} of them impossible" if found.refused else ""
     table = Table(
-        "file", _named(found.measure), "verdict", "values",
+        "file", _named(found.measure), "verdict", Column("values", overflow="fold"),
         title=f"the worst by {found.measure}", caption=f"{found.evaluations} simulations{refused}",
     )  # fmt: skip
     for i, case in enumerate(found.cases):

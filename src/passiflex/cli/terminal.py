@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 app = cyclopts.App(
     name="passiflex",
     help="Passive Cartesian impedance control of flexible-joint robots, with its energy accounted for.",
+    suppress_keyboard_interrupt=False,  # main says what an interruption means
 )
 console = Console(soft_wrap=True, highlight=False)
 QUIET = 10.0

@@ -101,7 +101,7 @@ INLINE lanes quarter_turns(lanes x, int64_t quarter)
     const lanes cosine = 1.0 - 0.5 * s + s * s * (1.0 / 24 + s * (-1.0 / 720 + s * (1.0 / 40320 + s * (-1.0 / 3628800
         + s * (1.0 / 479001600 + s * (-1.0 / 87178291200 + s * (1.0 / 20922789888000)))))));
     const lanes value = where(COMPARED((turn & 1), ==, all_bits(0)), sine, cosine);
-    return as_lanes(as_bits(value) ^ ((turn & 2) << 62));
+    return as_lanes(as_bits(value) ^ (-((turn >> 1) & 1) & all_bits(INT64_MIN)));
 }
 INLINE lane_bits moderate(lanes x) { return COMPARED(lanes_fabs(x), <=, all_lanes(1e5)); }
 ALONE lanes library_sin(lanes x) { lanes r; EACH_LANE LANE(r, l) = sin(LANE(x, l)); return r; }

@@ -131,6 +131,8 @@ def _bars(axes: Axes, bars: Bars | None, page: Page) -> None:
         axes.barh(row, abs(strength), height=0.65, facecolor=face, edgecolor=color, lw=0.9)
         sign = "" if not signed else "+" if strength > 0 else "−"
         axes.text(abs(strength) + 0.02, row, sign, va="center", fontsize=8, color=color)
+    rows = np.arange(len(page.columns))
+    axes.plot(bars.first_order, rows, ls="", marker="D", ms=3.5, mfc="white", mec="black", mew=0.8)
     axes.set_yticks(range(len(page.columns)), page.columns, fontsize=7)
     axes.set_ylim(len(page.columns) - 0.4, -0.6)
     axes.set_xlim(0, 1.08)
@@ -140,8 +142,8 @@ def _bars(axes: Axes, bars: Bars | None, page: Page) -> None:
 
 def _meaning(chance: float) -> str:
     return (
-        "|rank correlation|, + rises and − falls with the parameter; grey: difference between words. "
-        f"Filled: more than chance (p ≤ {chance:.3g} after Holm)"
+        "bar: |rank correlation|, + rises and − falls with the parameter; grey: difference between words; "
+        f"filled: more than chance (p ≤ {chance:.3g} after Holm); diamond: √(share of the variance)"
     )
 
 

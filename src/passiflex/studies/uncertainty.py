@@ -13,19 +13,17 @@ import pyarrow as pa
 
 from passiflex.campaigns import Campaign, run_campaign
 from passiflex.campaigns.intervals import Share, share_of
-from passiflex.campaigns.page import Page, page
+from passiflex.campaigns.page import Page, ideal_along, page
 from passiflex.campaigns.statistics import Statistics, numbers_of, statistics
 from passiflex.files import require_writable
 from passiflex.pieces.run_pieces import Progress
 from passiflex.plotting.figures import Curve, save_figure
 from passiflex.plotting.uncertainty import UncertainColumn, draw_uncertainty
-from passiflex.responses.closed_form import ideal_displacement
-from passiflex.responses.steps import StepWindow, step_window
-from passiflex.simulation import Scenario, resolve
+from passiflex.responses.steps import step_window
+from passiflex.simulation import Scenario
 from passiflex.simulation.control_settings import Control
-from passiflex.simulation.gains import target_inertia
 from passiflex.simulation.model_errors import ModelErrors
-from passiflex.studies.paper import TARGET_RATIO, Report, shipped_scenario, with_baseline, without_noise
+from passiflex.studies.paper import Report, shipped_scenario, with_baseline, without_noise
 from passiflex.studies.sampled import VARIANTS
 
 SAMPLES = 1000
@@ -176,7 +174,9 @@ def _at_torque_limit(rows: pa.Table) -> dict[str, Any]:
 
 def _column(campaign: Campaign, drawn: Page, at_limit: Share) -> UncertainColumn:
     window = step_window(campaign.scenario)
+    ideal = ideal_along(campaign)
     assert window is not None
+    assert ideal is not None
     by_metric = {ecdf.metric: ecdf for ecdf in drawn.distributions}
     return UncertainColumn(
         title=campaign.description,
@@ -184,21 +184,10 @@ def _column(campaign: Campaign, drawn: Page, at_limit: Share) -> UncertainColumn
         end=window.end,
         shares=(*(s for s in drawn.shares if s.name in ("passive", "settled", "fell_back")), at_limit),
         band=drawn.band,
-        ideal=_ideal(campaign.scenario, window),
+        ideal=Curve(*ideal),
         overshoot=by_metric["overshoot"],
         margin=by_metric["margin"],
     )
-
-
-def _ideal(scenario: Scenario, window: StepWindow) -> Curve:
-    """Return the ideal, which is the same for all ways: their gains K_x and D_x are."""
-    count = round(scenario.duration / RESPONSE) + 1
-    problem = resolve(scenario)
-    gains = problem.law.layout.unpack(problem.gains)
-    stiffness, damping = gains["stiffness"], gains["damping"]
-    inertia = target_inertia(stiffness, damping, TARGET_RATIO)
-    moved = ideal_displacement(inertia, stiffness, damping, problem.events, RESPONSE, count)
-    return Curve(np.arange(count, dtype=np.float64) * RESPONSE, moved @ window.direction)
 
 
 def _sparsely(report: Report, title: str) -> Callable[[Progress], None]:
