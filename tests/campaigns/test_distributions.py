@@ -147,7 +147,7 @@ def test_an_end_is_a_finite_number(wrong):
 
 
 def test_a_choice_has_values():
-    with pytest.raises(ValidationError, match="at least 1"):
+    with pytest.raises(ValidationError, match="needs one value at least"):
         Choice(values=())
     with pytest.raises(ValidationError, match="expected a number, a word, or true or false"):
         Choice(values=([1],))

@@ -1,5 +1,6 @@
 """Draws: distributed as asked for, and the same whichever samples are drawn, in which order, and of how many."""
 
+import sys
 import warnings
 from importlib import resources
 
@@ -141,3 +142,19 @@ def test_a_campaign_without_parameters_has_no_columns():
 def test_an_index_is_that_of_a_sample(wrong):
     with pytest.raises(ValueRangeError, match="needs a list of whole numbers from 0 to 1023"):
         draws(CAMPAIGNS["random"], wrong)
+
+
+def test_a_latin_hypercube_that_workers_cannot_hold_is_refused_for_any_sample():
+    c = campaign(sampling="latin_hypercube", samples=10**6)
+    with pytest.raises(
+        ValueRangeError, match=r"got 1000000 samples of 12 columns; needs at most 10000000 .*; try .* sobol"
+    ):
+        draws(c, [0])
+    assert draws(campaign(sampling="sobol", samples=10**6), [10**6 - 1]).shape == (1, 12)
+
+
+def test_a_latin_hypercube_may_have_as_many_numbers_as_workers_can_hold(monkeypatch):
+    monkeypatch.setattr(sys.modules[columns.__module__], "LARGEST_HYPERCUBE", 12 * 50)
+    assert draws(campaign(sampling="latin_hypercube", samples=50), [0]).shape == (1, 12)
+    with pytest.raises(ValueRangeError, match="got 51 samples of 12 columns"):
+        draws(campaign(sampling="latin_hypercube", samples=51), [0])

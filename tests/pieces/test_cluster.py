@@ -8,9 +8,10 @@ import shutil
 import socket
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 import pytest
@@ -121,6 +122,56 @@ print(time.monotonic() - start)
     line, seconds = done.stdout.splitlines()
     assert line.startswith("no scheduler answers at tcp://127.0.0.1:")
     assert float(seconds) < 2 * PATIENCE
+
+
+ASKING = """
+import sys
+from passiflex.pieces.cluster import Cluster
+from passiflex.errors import PassiflexError
+try:
+    Cluster(sys.argv[1])
+except PassiflexError as error:
+    print(error)
+"""
+
+
+@pytest.mark.parametrize(
+    "answer",
+    [b"", b"HTTP/1.1 400 Bad Request\r\nContent-Length: 0\r\n\r\n", b"\0" * 64],
+    ids=["silence", "web", "zeros"],
+)
+@pytest.mark.parametrize("closes", [True, False])
+def test_a_server_that_is_no_scheduler_is_one_line_within_seconds(answer: bytes, closes: bool) -> None:
+    accepted = []  # held, or they would be closed
+
+    def serve() -> None:
+        with suppress(OSError):  # the listener is closed
+            while True:
+                connection, _ = listener.accept()
+                connection.sendall(answer)
+                connection.close() if closes else accepted.append(connection)
+
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        threading.Thread(target=serve, daemon=True).start()
+        address = f"tcp://127.0.0.1:{listener.getsockname()[1]}"
+        words = [sys.executable, "-c", ASKING, address]
+        start = time.monotonic()
+        done = subprocess.run(words, env=ENVIRONMENT, capture_output=True, text=True, timeout=30)
+        seconds = time.monotonic() - start
+        listener.shutdown(socket.SHUT_RDWR)
+    for connection in accepted:
+        connection.close()
+    assert done.stderr == ""
+    assert re.fullmatch(rf"no scheduler answers at {address}; got .+; try `dask scheduler`.*\n", done.stdout)
+    assert seconds < 10
+
+
+def test_a_worker_is_no_scheduler() -> None:
+    with scheduler() as (address, _), worker(address):
+        wait_for_workers(address, 1)
+        with distributed.Client(address, timeout=20, set_as_default=False) as client:
+            (other,) = client.nthreads()
+        assert refused(other).startswith(f"no scheduler answers at {other}; got a part of dask that is no")
 
 
 @pytest.mark.parametrize("address", ["", "nonsense", "nonsense://127.0.0.1:1", "tcp://127.0.0.1"])

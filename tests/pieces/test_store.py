@@ -16,7 +16,7 @@ import pyarrow as pa
 import pytest
 
 from passiflex.errors import ValueRangeError
-from passiflex.files import OutputError
+from passiflex.files import OutputError, whole_file
 from passiflex.pieces.folder_lock import FolderInUseError
 from passiflex.pieces.manifest import FolderError
 from passiflex.pieces.run_pieces import PieceError
@@ -125,11 +125,21 @@ def change(folder: Path, **values: Any) -> None:
     path.write_text(json.dumps(json.loads(path.read_text()) | values))
 
 
+def test_fewer_samples_than_there_are_is_no_other_campaign(tmp_path: Path) -> None:
+    with open_store(tmp_path, "a: 1\n", 8):
+        pass
+    with pytest.raises(FolderError) as error, open_store(tmp_path, "a: 1\n", 7):
+        pass
+    assert (
+        str(error.value)
+        == "the campaign in this folder has more samples; got 7; needs 8 or more; try --samples 8"
+    )
+
+
 @pytest.mark.parametrize(
     ("asked", "message"),
     [
         ({"campaign": "a: 1\nb: 3\n"}, "the campaign: 'b: 2' there, 'b: 3' asked for"),
-        ({"samples": 7}, "the number of samples: there are 8, asked for 7"),
         ({"samples": 9}, "the number of samples: 8 → 9, and this sampling cannot be extended"),
     ],
 )
@@ -218,14 +228,27 @@ def test_a_damaged_file_of_all_rows_is_not_removed(tmp_path: Path, damage: Any) 
     rest(tmp_path)
 
 
+HALF_WRITTEN: list[Any] = []
+"""Blocks that are never left."""
+
+
 def test_half_written_files_are_not_pieces_and_are_removed(tmp_path: Path, whole: bytes) -> None:
     partly(tmp_path)
     piece = piece_path(tmp_path, range(20, 24))
-    for left in (piece.with_name(f".{piece.stem}-abc.parquet"), tmp_path / ".samples-abc.parquet"):
-        left.write_bytes(b"PAR1")
+    runs = tmp_path / "runs"
+    runs.mkdir()
+    for path in (
+        piece,
+        *(tmp_path / name for name in ("samples.parquet", "manifest.json", "statistics.json", "page.html")),
+        runs / "sample_3.nc",
+    ):
+        writing = whole_file(path)
+        writing.__enter__().write_bytes(b"PAR1")
+        HALF_WRITTEN.append(writing)  # as if killed within the block
+    (tmp_path / ".gitignore").write_text("*")
     assert read_rows(tmp_path).num_rows == 20
     assert rest(tmp_path).read_bytes() == whole
-    assert everything(tmp_path) == [".lock", "manifest.json", "samples.parquet"]
+    assert everything(tmp_path) == [".gitignore", ".lock", "manifest.json", "runs", "samples.parquet"]
 
 
 def test_pieces_left_beside_the_file_of_all_rows_do_not_count_twice(tmp_path: Path, whole: bytes) -> None:
@@ -269,7 +292,7 @@ def test_a_campaign_has_samples(tmp_path: Path) -> None:
 def test_a_second_run_is_refused_until_the_first_one_is_gone(tmp_path: Path) -> None:
     with start(tmp_path, 0, 100, text(sleep=0.1)) as first:
         try:
-            wait_for(lambda: any((tmp_path / "pieces").glob("*.parquet")))
+            wait_for(lambda: any((tmp_path / "pieces").glob("0*.parquet")))
             with pytest.raises(FolderInUseError) as error:
                 run(tmp_path, 0, 100, text(sleep=0.1))
             message = f"a campaign is running in {tmp_path}; got the lock of process {first.pid} on"

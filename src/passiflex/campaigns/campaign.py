@@ -9,9 +9,11 @@ import yaml
 from pydantic import Field, ValidationInfo, ValidatorFunctionWrapHandler, field_validator, model_validator
 
 from passiflex.campaigns.distributions import Distribution
+from passiflex.campaigns.measures import MEASURES
 from passiflex.campaigns.parameters import checked
 from passiflex.campaigns.target import Target, complete_data, locate
 from passiflex.simulation.control_settings import Seconds
+from passiflex.simulation.model_mistakes import word
 from passiflex.simulation.scenario import Scenario
 from passiflex.simulation.section import Mistakes, Section
 
@@ -32,6 +34,23 @@ class Keep(Section):
         default=None,
         description="interval at which the displacement of the end effector is kept, s; not kept if left out",
     )
+
+    @field_validator("metrics")
+    @classmethod
+    def _known_metrics(cls, metrics: tuple[str, ...] | None) -> tuple[str, ...] | None:
+        found = [
+            ((i,), word(name, list(MEASURES))) for i, name in enumerate(metrics or ()) if name not in MEASURES
+        ]
+        if found:
+            raise Mistakes(*found)
+        return metrics
+
+    @field_validator("by")
+    @classmethod
+    def _known_metric(cls, by: str | None) -> str | None:
+        if by is not None and by not in MEASURES:
+            raise ValueError(word(by, list(MEASURES)))
+        return by
 
     @model_validator(mode="after")
     def _by_a_metric(self) -> Self:

@@ -188,7 +188,7 @@ class Choice(AbstractDistribution):
 
     distribution: Literal["choice"] = Field(default="choice", description="kind of distribution")
     values: tuple[Annotated[Value, BeforeValidator(_value)], ...] = Field(
-        min_length=1, description="list of numbers, of words, or of true and false"
+        description="list of numbers, of words, or of true and false"
     )
     weights: tuple[Number, ...] | None = Field(
         default=None, description="how likely they are, relative to each other; all equally if left out"
@@ -197,6 +197,8 @@ class Choice(AbstractDistribution):
     @model_validator(mode="after")
     def _fitting(self) -> Self:
         found: list[tuple[tuple[str | int, ...], str]] = []
+        if not self.values:
+            found.append((("values",), "needs one value at least; got []"))
         if len({type(v) for v in self.values}) > 1:
             found.append((("values",), f"needs all numbers, or all words; got {shown(list(self.values))}"))
         for i, value in enumerate(self.values):

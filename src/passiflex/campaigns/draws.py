@@ -19,6 +19,9 @@ SEED_BITS = 53
 SMALLEST = 2.0**-54
 """Probabilities are drawn between this and one minus this: a quantile at 0 or 1 may be infinite."""
 
+LARGEST_HYPERCUBE = 10**7
+"""Most numbers of a Latin hypercube, which each worker holds whole: 80 MB."""
+
 
 def columns(campaign: Campaign) -> tuple[str, ...]:
     """Return the names of the columns of the draws: the path of each parameter, with `.1` … for each joint."""
@@ -55,7 +58,7 @@ def draws(campaign: Campaign, indices: Sequence[int] | NDArray[np.integer] | ran
     Raises
     ------
     ValueRangeError
-        For an index that is none of the campaign's.
+        For an index that is none of the campaign's, and for a Latin hypercube of more than 10^7 numbers.
     """
     wanted = _checked(campaign, indices)
     u = np.clip(_probabilities(campaign, wanted), SMALLEST, 1 - SMALLEST)
@@ -113,6 +116,13 @@ def _probabilities(campaign: Campaign, wanted: NDArray[np.int64]) -> Array:
     if wanted.size == 0 or count == 0:
         return np.empty((wanted.size, count))
     if campaign.sampling == "latin_hypercube":
+        if campaign.samples * count > LARGEST_HYPERCUBE:
+            raise ValueRangeError(
+                "a Latin hypercube, which every worker holds whole",
+                got=f"{campaign.samples} samples of {count} columns",
+                needs=f"at most {LARGEST_HYPERCUBE} numbers",
+                try_="sampling: sobol, as evenly spread and drawn row by row",
+            )
         return _latin_hypercube(campaign.seed, campaign.samples, count)[wanted]
     if campaign.sampling == "sobol":
         return _sobol(campaign.seed, count, wanted)

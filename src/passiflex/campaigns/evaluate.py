@@ -19,7 +19,6 @@ from passiflex.campaigns.measures import MEASURES, SIGNALS, measures
 from passiflex.campaigns.same_robot import require_same_robot
 from passiflex.campaigns.samples import sample_scenario
 from passiflex.errors import (
-    NameUnknownError,
     PassiflexError,
     PassiflexWarning,
     SimulationError,
@@ -93,18 +92,8 @@ def evaluate_problems(problems: Sequence[Problem], scenarios: Sequence[Scenario]
 
 
 def kept_measures(campaign: Campaign) -> tuple[str, ...]:
-    """Return the names of the measures that a campaign keeps.
-
-    Raises
-    ------
-    NameUnknownError
-        For a name that is none.
-    """
-    wanted = campaign.keep.metrics or tuple(MEASURES)
-    for name in (*wanted, *((campaign.keep.by,) if campaign.keep.by else ())):
-        if name not in MEASURES:
-            raise NameUnknownError("metric", name, list(MEASURES))
-    return wanted
+    """Return the names of the measures that a campaign keeps."""
+    return campaign.keep.metrics or tuple(MEASURES)
 
 
 def require_response(campaign: Campaign) -> None:

@@ -90,7 +90,7 @@ class Found:
         }
 
     def save(self, folder: str | Path) -> list[Path]:
-        """Write worst_1.yaml … and search.json, and return the paths.
+        """Write worst_1.yaml … and search.json, and return the paths; those of another search go.
 
         Raises
         ------
@@ -103,6 +103,8 @@ class Found:
         for path, text in zip(paths, texts.values(), strict=True):
             with whole_file(path) as temporary:
                 temporary.write_text(text, encoding="utf-8")
+        for other in set(Path(folder).glob("worst_*.yaml")) - set(paths):
+            other.unlink()
         return paths
 
 

@@ -9,12 +9,11 @@ from pathlib import Path
 import pyarrow as pa
 import yaml
 
-from passiflex.campaigns.campaign import Campaign
+from passiflex.campaigns.campaign import MOST_SAMPLES, Campaign
 from passiflex.campaigns.campaign_file import parse_campaign
 from passiflex.campaigns.evaluate import (
     REFUSED,
     evaluate_samples,
-    kept_measures,
     require_response,
     run_sample,
 )
@@ -99,8 +98,9 @@ def run_campaign(
         folder of something else, a scheduler that does not answer; later for a disk that is full.
     """
     if samples is not None:
+        if not 1 <= samples <= MOST_SAMPLES:
+            raise ValueRangeError("number of samples", got=samples, needs=f"1 to {MOST_SAMPLES}")
         campaign = parse_campaign(_with_samples(campaign, samples), source="campaign")
-    kept_measures(campaign)
     require_response(campaign)
     with _engine(workers, scheduler) as engine:  # first, as a scheduler that is not there is soon found out
         require_possible(campaign)

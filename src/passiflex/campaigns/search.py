@@ -79,6 +79,8 @@ def search(
             got=f"{evaluations} and {keep}",
             needs=f"at least {LEAST_POPULATION} simulations, and one case to keep",
         )
+    if seed < 0:
+        raise ValueRangeError("seed of the search", got=seed, needs="a whole number, ≥ 0")
     box = Box.of(campaign)
     trials = _Trials(campaign, measure, box, evaluations, report)
     population = int(np.clip(evaluations // GENERATIONS, LEAST_POPULATION, MOST_POPULATION))

@@ -27,6 +27,8 @@ def main() -> None:
         print(f"passiflex: {error}", file=sys.stderr)
         sys.exit(2)
     except KeyboardInterrupt:
-        print("passiflex: interrupted; nothing is half-written, and the same command goes on", file=sys.stderr)
+        print(
+            "passiflex: interrupted; nothing is half-written, and the same command goes on", file=sys.stderr
+        )
         sys.exit(130)
     sys.exit(status if isinstance(status, int) else 0)

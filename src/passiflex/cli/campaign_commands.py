@@ -20,7 +20,10 @@ def campaign(
     *,
     out: Annotated[Path, cyclopts.Parameter(help="folder of the results; an interrupted campaign goes on")],
     samples: Annotated[int | None, cyclopts.Parameter(help="instead of the campaign's own number")] = None,
-    workers: Annotated[int | None, cyclopts.Parameter(help="processes; one for each core")] = None,
+    workers: Annotated[
+        int | None,
+        cyclopts.Parameter(help="processes, 0 for none beside this; one per core"),
+    ] = None,
     scheduler: Annotated[
         str | None, cyclopts.Parameter(help="address of a dask scheduler, as tcp://host:8786")
     ] = None,
@@ -101,7 +104,7 @@ def search(
 
 
 def _sum_up(results: Results) -> None:
-    """Print the statistics, and write them and the page of figures beside the rows."""
+    """Write the statistics and the page of figures beside the rows, then print them: a closed pipe loses nothing."""
     from passiflex.campaigns.page import ideal_along, page
     from passiflex.campaigns.statistics import statistics
     from passiflex.cli.campaign_tables import statistics_tables
@@ -111,12 +114,13 @@ def _sum_up(results: Results) -> None:
 
     rows = results.rows()
     found = statistics(results.campaign, rows)
-    for table in statistics_tables(found):
-        console.print(table)
     with whole_file(results.folder / "statistics.json") as temporary:
         temporary.write_text(json.dumps(found.to_dict(), indent=2, allow_nan=False) + "\n", encoding="utf-8")
     ideal = ideal_along(results.campaign)
     drawing = draw_campaign(page(results.campaign, rows, found), {"msd": Curve(*ideal)} if ideal else {})
     written = [results.folder / "samples.parquet", results.folder / "statistics.json"]
-    for path in (*written, *save_figure(drawing, results.folder / "page"), *results.runs):
+    written += [*save_figure(drawing, results.folder / "page"), *results.runs]
+    for table in statistics_tables(found):
+        console.print(table)
+    for path in written:
         console.print(f"wrote {path}")

@@ -50,7 +50,7 @@ def quantile_table(found: Statistics) -> Table:
             table.add_row(_named(spread.metric), *[""] * 4, none)
             continue
         low, _, median, _, high = spread.quantiles
-        interval = f"{median.low:.2g} to {median.high:.2g}"
+        interval = f"{median.low:.3g} – {median.high:.3g}"
         numbers = [f"{q.value:.3g}" for q in (low, median, high)]
         table.add_row(_named(spread.metric), *numbers[:2], interval, numbers[2], none)
     return table
@@ -112,7 +112,7 @@ def _association(a: Association) -> list[str]:
 
 
 def _index(index: Index | None) -> str:
-    return "" if index is None else f"{index.value:.2f} ({index.low:.2f} to {index.high:.2f})"
+    return "" if index is None else f"{index.value:.2f} ({index.low:.2f} – {index.high:.2f})"
 
 
 def _listed(values: Values) -> str:

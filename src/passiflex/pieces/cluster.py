@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import asyncio
 import logging
 import re
+import threading
 from collections.abc import Callable
 from concurrent.futures import Future
 from contextlib import suppress
@@ -57,14 +59,11 @@ class Cluster(Engine):
             "distributed.client",
         ):  # each has a level; what they say comes as our errors
             logging.getLogger(name).setLevel(logging.CRITICAL)
+        _require_scheduler(address)
         try:
             self._client: Any = distributed.Client(address, timeout=PATIENCE, set_as_default=False)
-        except (OSError, ValueError) as error:
-            raise EngineError(
-                f"no scheduler answers at {address}",
-                got=error,
-                try_="`dask scheduler`, which prints its address",
-            ) from error
+        except Exception as error:  # lost since, or of another version: dask has many
+            raise _silent(address, error) from error
         try:
             self._require_fit_workers(address)
         except BaseException:
@@ -141,3 +140,46 @@ class Cluster(Engine):
                     got=f"{threads} threads",
                     try_="`dask worker --nworkers N --nthreads 1`",
                 )
+
+
+def _require_scheduler(address: str) -> None:
+    """Raise EngineError unless a scheduler says in time that it is one.
+
+    It is asked before there is a client: that waits forever for a server that accepts and stays silent, takes
+    what a web server says for the size of a message, and prints what goes wrong.
+    """
+    failed: list[BaseException] = [TimeoutError("no answer")]
+
+    def ask() -> None:
+        try:
+            asyncio.run(asyncio.wait_for(_ask(address), 1.5 * PATIENCE))
+            failed.clear()
+        except Exception as error:  # whatever the other side makes of us
+            failed[:] = [error]
+
+    thread = threading.Thread(target=ask, daemon=True)  # of its own: the caller may run an event loop
+    thread.start()
+    thread.join(2 * PATIENCE)
+    if failed:
+        raise _silent(address, failed[0]) from failed[0]
+
+
+async def _ask(address: str) -> None:
+    from distributed.comm import connect
+
+    comm = await connect(address, timeout=PATIENCE)
+    try:
+        await comm.write({"op": "identity", "reply": True})
+        said = await comm.read()
+    finally:
+        comm.abort()
+    if not (isinstance(said, dict) and "workers" in said):
+        raise EngineError("a part of dask that is no scheduler")
+
+
+def _silent(address: str, error: BaseException) -> EngineError:
+    return EngineError(
+        f"no scheduler answers at {address}",
+        got=(str(error) or type(error).__name__).partition("\n")[0],
+        try_="`dask scheduler`, which prints its address",
+    )

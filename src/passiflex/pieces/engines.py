@@ -78,7 +78,9 @@ class LocalProcesses(Engine):
     def __init__(self, workers: int | None = None):
         self._workers = usable_cores() if workers is None else workers
         if self._workers < 1:
-            raise ValueRangeError("number of worker processes", got=workers, needs="≥ 1")
+            raise ValueRangeError(
+                "number of worker processes", got=workers, needs="≥ 1, or 0 for this process"
+            )
         self._calls: queue.SimpleQueue[_Call | None] = queue.SimpleQueue()
         self._lock = threading.Lock()
         self._closed = self._killed = False

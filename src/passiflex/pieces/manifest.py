@@ -69,8 +69,13 @@ class Manifest:
         if source_digest() != self.source:
             was = f"version {self.version}, commit {self.commit}"
             differs.append(f"the source of the package: the rows are from {was}, source {self.source}")
-        if samples < self.samples:
-            differs.append(f"the number of samples: there are {self.samples}, asked for {samples}")
+        if samples < self.samples and not differs:
+            raise FolderError(
+                "the campaign in this folder has more samples",
+                got=str(samples),
+                needs=f"{self.samples} or more",
+                try_=f"--samples {self.samples}",
+            )
         if samples > self.samples and not extends:
             differs.append(
                 f"the number of samples: {self.samples} → {samples}, and this sampling cannot be extended"

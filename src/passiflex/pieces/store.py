@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -32,6 +33,8 @@ from passiflex.pieces.tables import unified
 
 PIECE = 32
 """Samples of a piece."""
+_HALF_WRITTEN = re.compile(r"\..+-[a-z0-9_]{8}(\.\w+)?")
+"""Names of the temporary files of `whole_file`; other hidden files, such as a .gitignore, are the user's."""
 
 
 @contextmanager
@@ -197,8 +200,8 @@ class Store:
 
 
 def _sweep(folder: Path) -> None:
-    """Remove what killed processes left half-written."""
-    for left in (*folder.glob(".manifest-*.json"), *folder.glob(".samples-*.parquet")):
-        left.unlink()
-    for left in (folder / PIECES).glob(".*.parquet"):
-        left.unlink()
+    """Remove what killed processes left half-written: rows, and what is made of them in the same folder."""
+    for inner in (folder, folder / PIECES, folder / "runs"):
+        for left in inner.glob(".*"):
+            if _HALF_WRITTEN.fullmatch(left.name) and left.is_file():
+                left.unlink(missing_ok=True)

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 import pyarrow.parquet as pq
+from numpy.typing import NDArray
 
+from passiflex.errors import NameUnknownError
 from passiflex.files import whole_file
 from passiflex.pieces.manifest import FolderError, load_manifest
 from passiflex.pieces.tables import INDEX, WRITING, conformed, opened, unified
@@ -19,7 +23,9 @@ from passiflex.pieces.tables import INDEX, WRITING, conformed, opened, unified
 ALL = "samples.parquet"
 PIECES = "pieces"
 GROUP = 8192
-"""Samples of a row group of the file of all: what is in memory while it is written, and what a reader can skip."""
+"""Most samples of a row group of the file of all: what is in memory while it is written, and what a reader skips."""
+GROUP_BYTES = 2**24
+"""A row group ends with the row that fills so many bytes, as `_widths` counts them, if that comes first."""
 _PIECE = re.compile(r"(\d+)-(\d+)\.parquet")
 
 
@@ -64,8 +70,8 @@ def pieces(folder: Path) -> list[Stored]:
     return found
 
 
-def parts(file: Stored) -> Iterator[pa.Table]:
-    """Yield the rows of a file, a row group at a time.
+def parts(file: Stored, columns: Sequence[str] | None = None) -> Iterator[pa.Table]:
+    """Yield the rows of a file, a row group at a time; of some columns if they are named, and INDEX.
 
     Raises
     ------
@@ -75,7 +81,7 @@ def parts(file: Stored) -> Iterator[pa.Table]:
     start = file.samples.start
     with _noticing_damage(file.path), opened(file.path) as parquet:
         for group in range(parquet.num_row_groups):
-            table = parquet.read_row_group(group)
+            table = parquet.read_row_group(group, None if columns is None else [INDEX, *columns])
             if table[INDEX].to_pylist() != list(range(start, start + table.num_rows)):
                 raise ValueError("other samples than there should be")
             start += table.num_rows
@@ -90,33 +96,71 @@ def schema_of(file: Stored) -> pa.Schema:
         return pq.read_schema(file.path)
 
 
-def read_rows(folder: str | Path) -> pa.Table:
+def read_rows(folder: str | Path, columns: Sequence[str] | None = None) -> pa.Table:
     """Return the rows of all finished samples in their order, of a campaign that is complete or not, or runs.
+
+    Parameters
+    ----------
+    columns: Only these, in this order; the others are not read, nor is damage in them noticed. Before the
+        first piece is finished nobody knows the columns: any name gives an empty one.
 
     Raises
     ------
     FolderError
         If the folder holds no campaign, or a file of it is damaged.
+    NameUnknownError
+        For a column that there is not.
     """
     folder = Path(folder)
     load_manifest(folder)
     while True:
         files = stored(folder)
-        if not files:
-            return pa.table({INDEX: pa.array([], pa.int64())})
         try:
-            schema = unified(schema_of(file) for file in files)
-            return pa.concat_tables([conformed(part, schema) for file in files for part in parts(file)])
+            schema = _asked_for(files, columns)
+            blocks = [conformed(part, schema) for file in files for part in parts(file, columns)]
+            return pa.concat_tables([schema.empty_table(), *blocks])
         except (FileNotFoundError, DamagedError):
             if stored(folder) == files:
                 raise
             # else all were written into one file meanwhile: once more
 
 
+def read_blocks(folder: str | Path, columns: Sequence[str] | None = None) -> Iterator[pa.Table]:
+    """Yield what `read_rows` returns in blocks of rows, of which one is in memory at a time.
+
+    A block is a piece, or as much of the file of all as GROUP and GROUP_BYTES say. When a campaign completes
+    meanwhile, the samples after those already given follow from the file of all, and the type of a column may
+    then be wider than before: `tables.unified` has the one for all.
+
+    Raises
+    ------
+    FolderError, NameUnknownError
+        As `read_rows`.
+    """
+    folder = Path(folder)
+    load_manifest(folder)
+    given = 0
+    while True:
+        files = stored(folder)
+        try:
+            schema = _asked_for(files, columns)
+            for file in files:
+                for part in parts(file, columns) if file.samples.stop > given else ():
+                    rows = part.slice(int(np.searchsorted(part[INDEX].to_numpy(), given)))
+                    if rows.num_rows:
+                        given = rows[INDEX][-1].as_py() + 1
+                        yield conformed(rows, schema)
+            return
+        except (FileNotFoundError, DamagedError):
+            if stored(folder) == files:
+                raise
+
+
 def write_all(folder: Path, schema: pa.Schema) -> Path:
     """Write the rows of all files into one, and remove the others.
 
-    Its bytes depend on the rows alone: it is written anew in row groups of one size.
+    Its bytes depend on the rows alone: it is written anew, in row groups that end where the widths of the rows
+    say, from the first sample on. What is in memory is one of them and a part of a file.
     """
     path = folder / ALL
     files = stored(folder)
@@ -124,7 +168,7 @@ def write_all(folder: Path, schema: pa.Schema) -> Path:
         with whole_file(path) as temporary, temporary.open("wb") as out:
             with pq.ParquetWriter(out, schema, **WRITING) as writer:
                 for group in _groups(files, schema):
-                    writer.write_table(group, row_group_size=GROUP)
+                    writer.write_table(group, row_group_size=group.num_rows)
             out.flush()
             os.fsync(out.fileno())
         settle(folder)
@@ -142,18 +186,50 @@ def settle(folder: Path) -> None:
         os.close(handle)
 
 
+def _asked_for(files: list[Stored], columns: Sequence[str] | None) -> pa.Schema:
+    """Return the schema of the rows of all files, of some columns if they are named."""
+    if not files:
+        names = [INDEX] if columns is None else columns
+        return pa.schema([(name, pa.int64() if name == INDEX else pa.null()) for name in names])
+    schema = unified(schema_of(file) for file in files)
+    if columns is None:
+        return schema
+    for name in columns:
+        if name not in schema.names:
+            raise NameUnknownError("column", name, schema.names)
+    return pa.schema([schema.field(name) for name in columns])
+
+
 def _groups(files: list[Stored], schema: pa.Schema) -> Iterator[pa.Table]:
-    waiting, count = [], 0
+    """Yield the rows in groups that do not depend on how they are spread over files."""
+    waiting: list[pa.Table] = []
+    count, size = 0, 0
     for file in files:
         for part in parts(file):
-            waiting.append(conformed(part, schema))
-            count += part.num_rows
-            while count >= GROUP:
-                rows = pa.concat_tables(waiting)
-                yield rows.slice(0, GROUP).combine_chunks()
-                waiting, count = [rows.slice(GROUP)], count - GROUP
+            rows = conformed(part, schema)
+            widths = _widths(rows)
+            start = 0
+            while start < rows.num_rows:
+                sizes = size + np.cumsum(widths[start : start + GROUP - count])
+                taken = min(int(np.searchsorted(sizes, GROUP_BYTES)) + 1, len(sizes))
+                waiting.append(rows.slice(start, taken))
+                start, count, size = start + taken, count + taken, int(sizes[taken - 1])
+                if count == GROUP or size >= GROUP_BYTES:
+                    yield pa.concat_tables(waiting).combine_chunks()
+                    waiting, count, size = [], 0, 0
     if count:
         yield pa.concat_tables(waiting).combine_chunks()
+
+
+def _widths(rows: pa.Table) -> NDArray[np.int64]:
+    """Return about how many bytes each row takes: 8 for a value or a number of a list, 1 for a byte of text."""
+    widths = np.full(rows.num_rows, 8 * rows.num_columns, dtype=np.int64)
+    for column in rows.columns:
+        if pa.types.is_list(column.type):
+            widths += 8 * pc.list_value_length(column).fill_null(0).to_numpy()
+        elif pa.types.is_string(column.type):
+            widths += pc.binary_length(column).fill_null(0).to_numpy()
+    return widths
 
 
 @contextmanager

@@ -51,6 +51,7 @@ def draw_uncertainty(columns: Sequence[UncertainColumn], conditions: str) -> Fig
             grid[0, j].sharey(grid[0, 0])
             grid[0, j].tick_params(labelleft=j == 0)
         grid[0, 0].set_ylabel("Z displacement [m]")
+        grid[0, 0].legend(loc="lower right")
         low = min((c.band.quantiles[0].min() for c in columns if c.band is not None), default=0.0)
         high = max((c.band.quantiles[-1].max() for c in columns if c.band is not None), default=1.0)
         grid[0, 0].set_ylim(max(low, -0.04) - 0.005, min(high, 0.15) + 0.005)
@@ -92,4 +93,4 @@ def _shares(axes: Axes, shares: Sequence[Share], *, named: bool) -> None:
     axes.set_yticks(range(len(SHOWN)), SHOWN.values() if named else [""] * len(SHOWN))
     axes.set_ylim(len(SHOWN) - 0.5, -0.75)
     axes.set_xlim(0, 1)
-    axes.set_xticks([0, 0.5, 1], ["0", "50 %", "100 %"])
+    axes.set_xticks([0, 0.5, 1], ["0", "50", "100 %"])
