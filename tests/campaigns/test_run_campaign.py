@@ -399,3 +399,16 @@ def test_what_no_row_depends_on_may_change(tmp_path: Path) -> None:
     more = campaign(samples=4, description="again", keep={"worst": 1, "by": "margin"})
     assert len(run_campaign(more, out, workers=0).runs) == 1
     assert (out / "samples.parquet").read_bytes() == before
+
+
+def test_rows_come_with_and_without_the_responses(tmp_path: Path) -> None:
+    """What is wide is read in blocks; without a response there is none."""
+    results = run_campaign(campaign(samples=4, keep={"response": 0.1}), tmp_path / "out", workers=0)
+    whole, narrow = results.rows(), results.narrow_rows()
+    wide = {name for name in whole.column_names if name.startswith("displacement_")}
+    assert len(wide) == 3
+    assert narrow.equals(whole.drop_columns(sorted(wide)))
+    blocks = list(results.responses())
+    assert sum(block.num_rows for block in blocks) == 4
+    assert set(blocks[0].column_names) == {"verdict", *wide}
+    assert list(run_campaign(campaign(samples=2), tmp_path / "none", workers=0).responses()) == []

@@ -35,6 +35,8 @@ from passiflex.simulation.problem import Problem
 
 REFUSED = "refused"
 """Verdict of a sample that is no possible robot or scenario: it was not run, and `failure` says why."""
+RESPONSE = "displacement_"
+"""Columns of the response begin so."""
 TEXTS = ("verdict", "decided_by", "failure")
 CANNOT_RUN = (SimulationError, ValueRangeError)
 """What is raised for a problem that cannot be integrated, as one with a pole beyond all bounds."""
@@ -182,7 +184,7 @@ def _kept_response(campaign: Campaign, run: Signals) -> dict[str, list[float]]:
 
 
 def _response_names(campaign: Campaign) -> tuple[str, ...]:
-    return tuple(f"displacement_{a}" for a in "xyz") if campaign.keep.response else ()
+    return tuple(f"{RESPONSE}{a}" for a in "xyz") if campaign.keep.response else ()
 
 
 def _padded(campaign: Campaign, values: NDArray[np.float64]) -> list[float]:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Iterable, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from passiflex.campaigns.campaign import Campaign
@@ -101,8 +102,15 @@ class Page(NamedTuple):
     scatter: Scatter | None
 
 
-def page(campaign: Campaign, rows: pa.Table, found: Statistics) -> Page:
-    """Return the page of a campaign's rows and their statistics."""
+def page(
+    campaign: Campaign, rows: pa.Table, found: Statistics, blocks: Iterable[pa.Table] | None = None
+) -> Page:
+    """Return the page of a campaign's rows and their statistics.
+
+    Parameters
+    ----------
+    blocks: Of the verdicts and responses, which are wide, if the rows come without them.
+    """
     run = np.array([v != REFUSED for v in rows["verdict"].to_pylist()] if rows.num_rows else [], dtype=bool)
     chance = 1 - found.level
     columns, bars = _bars(campaign, found, chance)
@@ -113,7 +121,7 @@ def page(campaign: Campaign, rows: pa.Table, found: Statistics) -> Page:
         distributions=tuple(
             _ecdf(name, numbers_of(rows, name)[run]) for name in DISTRIBUTIONS if name in rows.column_names
         ),
-        band=_band(campaign, rows, run),
+        band=_band(campaign, [rows] if blocks is None else blocks),
         columns=columns,
         bars=bars,
         chance=chance,
@@ -154,15 +162,28 @@ def _ecdf(name: str, values: Array) -> Ecdf:
     return Ecdf(name, MEASURES[name].unit, finite, shares, endless)
 
 
-def _band(campaign: Campaign, rows: pa.Table, run: NDArray[np.bool_]) -> Band | None:
+def _band(campaign: Campaign, blocks: Iterable[pa.Table]) -> Band | None:
     window, interval = step_window(campaign.scenario), campaign.keep.response
-    if window is None or interval is None or not run.any():
+    if window is None or interval is None:
         return None
-    moved = [np.array(rows[f"displacement_{axis}"].to_pylist(), dtype=float)[run] for axis in "xyz"]
-    along = np.einsum("a,aij->ij", window.direction, np.array(moved))
+    moved = [_along(block, window.direction) for block in blocks if block.num_rows]
+    along = np.concatenate(moved) if moved else np.zeros((0, 0), np.float32)
+    if not along.size:
+        return None
     going = ~np.isnan(along).all(axis=0)
     time = np.arange(along.shape[1]) * interval
-    return Band(time[going], np.nanquantile(along[:, going], BAND, axis=0))
+    quantiles: Array = np.asarray(np.nanquantile(along[:, going], BAND, axis=0), dtype=np.float64)
+    return Band(time[going], quantiles)
+
+
+def _along(block: pa.Table, direction: Array) -> NDArray[np.float32]:
+    """Return the displacement along the step (samples, instants) of those that ran, in single precision."""
+    ran = block.filter(pc.not_equal(block["verdict"], REFUSED))
+    out: Any = np.float32(0)
+    for axis, share in zip("xyz", direction, strict=True):
+        flat = ran[f"displacement_{axis}"].combine_chunks().flatten().to_numpy(zero_copy_only=False)
+        out = out + np.float32(share) * flat.astype(np.float32).reshape(ran.num_rows, -1)
+    return np.asarray(out, dtype=np.float32)
 
 
 def _bars(campaign: Campaign, found: Statistics, chance: float) -> tuple[tuple[str, ...], tuple[Bars, ...]]:

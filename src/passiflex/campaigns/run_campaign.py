@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,13 +11,15 @@ import yaml
 
 from passiflex.campaigns.campaign import MOST_SAMPLES, Campaign
 from passiflex.campaigns.campaign_file import parse_campaign
+from passiflex.campaigns.draws import draws
 from passiflex.campaigns.evaluate import (
     REFUSED,
+    RESPONSE,
     evaluate_samples,
+    kept_measures,
     require_response,
     run_sample,
 )
-from passiflex.campaigns.measures import MEASURES
 from passiflex.campaigns.possible import require_possible
 from passiflex.campaigns.ranking import worst_first
 from passiflex.campaigns.same_robot import marked, robot_digest
@@ -28,7 +30,7 @@ from passiflex.pieces.engines import Engine, InProcess, LocalProcesses
 from passiflex.pieces.manifest import load_manifest
 from passiflex.pieces.run_pieces import Progress, run_pieces
 from passiflex.pieces.store import open_store
-from passiflex.pieces.stored_rows import read_rows
+from passiflex.pieces.stored_rows import read_blocks, read_rows
 from passiflex.simulation import resolve
 from passiflex.simulation.admissible import require_stable
 from passiflex.simulation.batch import lane_loop
@@ -52,9 +54,19 @@ class Results:
     campaign: Campaign
     runs: tuple[Path, ...] = ()
 
-    def rows(self) -> pa.Table:
-        """Return one row for each sample, in their order."""
-        return read_rows(self.folder)
+    def rows(self, columns: Sequence[str] | None = None) -> pa.Table:
+        """Return one row for each sample, in their order; some columns only if they are named."""
+        return read_rows(self.folder, columns)
+
+    def narrow_rows(self) -> pa.Table:
+        """Return the rows without the responses, which are wide."""
+        known = next(read_blocks(self.folder)).column_names
+        return self.rows([name for name in known if not name.startswith(RESPONSE)])
+
+    def responses(self) -> Iterator[pa.Table]:
+        """Yield verdicts and responses, some samples at a time; nothing if no responses are kept."""
+        if self.campaign.keep.response is not None:
+            yield from read_blocks(self.folder, ["verdict", *(f"{RESPONSE}{axis}" for axis in "xyz")])
 
     @classmethod
     def load(cls, folder: str | Path) -> Results:
@@ -104,6 +116,7 @@ def run_campaign(
     require_response(campaign)
     with _engine(workers, scheduler) as engine:  # first, as a scheduler that is not there is soon found out
         require_possible(campaign)
+        draws(campaign, [0])  # refuses a sampling that cannot be held
         robot = _ready(campaign)
         prefix = campaign.sampling != "latin_hypercube"
         text, identity = marked(campaign.to_yaml(), robot), marked(_identity(campaign), robot)
@@ -123,9 +136,10 @@ def worst(results: Results, measure: str, count: int) -> list[int]:
     NameUnknownError
         If it is no measure, or none that the campaign keeps.
     """
-    table = results.rows()
-    if measure not in (kept := [name for name in MEASURES if name in table.column_names]):
+    kept = kept_measures(results.campaign)
+    if measure not in kept:
         raise NameUnknownError("metric", measure, kept)
+    table = results.rows(["sample", "verdict", "failure", measure])
     rows = [i for i, verdict in enumerate(table["verdict"].to_pylist()) if verdict != REFUSED]
     run = table.take(rows)
     ranked = worst_first(measure, run[measure].to_pylist(), run["failure"].to_pylist())

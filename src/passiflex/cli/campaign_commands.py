@@ -112,12 +112,14 @@ def _sum_up(results: Results) -> None:
     from passiflex.plotting.campaign import draw_campaign
     from passiflex.plotting.figures import Curve, save_figure
 
-    rows = results.rows()
+    rows = results.narrow_rows()
     found = statistics(results.campaign, rows)
     with whole_file(results.folder / "statistics.json") as temporary:
         temporary.write_text(json.dumps(found.to_dict(), indent=2, allow_nan=False) + "\n", encoding="utf-8")
     ideal = ideal_along(results.campaign)
-    drawing = draw_campaign(page(results.campaign, rows, found), {"msd": Curve(*ideal)} if ideal else {})
+    drawing = draw_campaign(
+        page(results.campaign, rows, found, results.responses()), {"msd": Curve(*ideal)} if ideal else {}
+    )
     written = [results.folder / "samples.parquet", results.folder / "statistics.json"]
     written += [*save_figure(drawing, results.folder / "page"), *results.runs]
     for table in statistics_tables(found):
