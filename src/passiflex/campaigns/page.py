@@ -171,7 +171,7 @@ def _band(campaign: Campaign, blocks: Iterable[pa.Table]) -> Band | None:
     if not along.size:
         return None
     going = ~np.isnan(along).all(axis=0)
-    time = np.arange(along.shape[1]) * interval
+    time: Array = np.arange(along.shape[1], dtype=np.float64) * interval
     quantiles: Array = np.asarray(np.nanquantile(along[:, going], BAND, axis=0), dtype=np.float64)
     return Band(time[going], quantiles)
 
