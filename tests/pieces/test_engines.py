@@ -191,7 +191,7 @@ class Elsewhere(Executor):
 
 
 def test_rows_of_other_source_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(EngineError, match=r"samples 0 to 3 were evaluated by other source.* got 0123"):
+    with pytest.raises(EngineError, match=r"samples \d+ to \d+ were evaluated by other source.* got 0123"):
         run_with(Elsewhere(), tmp_path)
     assert read_rows(tmp_path).num_rows == 0
 
