@@ -41,8 +41,8 @@ def share_table(found: Statistics) -> Table:
 def quantile_table(found: Statistics) -> Table:
     """Return the quantiles of each metric, with the interval of the median; statistics.json has more of them."""
     table = _table(
-        "metric", "5 %", "median", _level(found), "95 %", "none", title="quantiles of the finite values",
-        caption=f"{_level(found)}: of the median; none: samples without a finite value",
+        "metric", "5 %", "median", _level(found), "95 %", "n/a", title="quantiles of the finite values",
+        caption=f"{_level(found)}: of the median; n/a: samples without a finite value",
     )  # fmt: skip
     for spread in found.spreads:
         none = str(spread.not_finite or "")
