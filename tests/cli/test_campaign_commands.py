@@ -8,43 +8,19 @@ import subprocess
 import sys
 import time
 from pathlib import Path
-from typing import NamedTuple
 
 import pytest
 
 import passiflex
 from campaigns.small_campaigns import SAMPLED, UNSTABLE, campaign
+from cli.shell import Result, Shell
 from passiflex.campaigns import Results, sample_scenario
 from passiflex.campaigns.measures import measures
-from passiflex.cli import campaign_commands, main, terminal
+from passiflex.cli import campaign_commands, terminal
 from passiflex.pieces.run_pieces import Progress
 from passiflex.responses.steps import step_window
 from passiflex.simulation import Run, resolve
 from worlds import merged
-
-
-class Result(NamedTuple):
-    """What a call of the command line left behind."""
-
-    status: int
-    out: str
-    err: str
-
-
-class Shell:
-    """Calls the command line within this process."""
-
-    def __init__(self, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]):
-        self._monkeypatch, self._capsys = monkeypatch, capsys
-
-    def __call__(self, *arguments: object) -> Result:
-        self._monkeypatch.setattr(sys, "argv", ["passiflex", *map(str, arguments)])
-        self._capsys.readouterr()
-        with pytest.raises(SystemExit) as end:
-            main()
-        captured = self._capsys.readouterr()
-        assert "Traceback" not in captured.out + captured.err
-        return Result(int(end.value.code or 0), captured.out, captured.err)
 
 
 @pytest.fixture

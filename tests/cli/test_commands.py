@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import passiflex
-from passiflex.cli import main
+from cli.shell import Shell
 from passiflex.passivity import audit
 from passiflex.simulation import Run, parse_scenario, simulate
 
@@ -48,30 +48,6 @@ law:
   damping: {translation: 20}
 duration: 0.5
 """
-
-
-class Result:
-    """What a call of the command line left behind."""
-
-    def __init__(self, status: int, out: str, err: str):
-        self.status, self.out, self.err = status, out, err
-        assert "Traceback" not in out + err
-
-
-class Shell:
-    """Calls the command line within this process."""
-
-    def __init__(self, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]):
-        self._monkeypatch, self._capsys = monkeypatch, capsys
-
-    def __call__(self, *arguments: object) -> Result:
-        self._monkeypatch.setattr(sys, "argv", ["passiflex", *map(str, arguments)])
-        self._capsys.readouterr()
-        with pytest.raises(SystemExit) as end:
-            main()
-        code = end.value.code
-        captured = self._capsys.readouterr()
-        return Result(0 if code is None else int(code), captured.out, captured.err)
 
 
 @pytest.fixture

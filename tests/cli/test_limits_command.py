@@ -3,35 +3,19 @@
 from __future__ import annotations
 
 import re
-import sys
 from pathlib import Path
-from typing import NamedTuple
 
 import pytest
 import yaml
 
-from passiflex.cli import main
+from cli.shell import Result, Shell
 from passiflex.limits import check
 from passiflex.simulation import load_scenario
 from worlds import PLAIN, merged
 
 
-class Result(NamedTuple):
-    """What a call of the command line left behind."""
-
-    status: int
-    out: str
-    err: str
-
-
 def limits(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, *arguments: object) -> Result:
-    monkeypatch.setattr(sys, "argv", ["passiflex", "limits", *map(str, arguments)])
-    capsys.readouterr()
-    with pytest.raises(SystemExit) as end:
-        main()
-    captured = capsys.readouterr()
-    assert "Traceback" not in captured.out + captured.err
-    return Result(int(end.value.code or 0), captured.out, captured.err)
+    return Shell(monkeypatch, capsys)("limits", *arguments)
 
 
 @pytest.fixture

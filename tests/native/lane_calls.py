@@ -8,6 +8,7 @@ import casadi as cs
 import numpy as np
 
 from passiflex.native import compile_source
+from passiflex.native.lane_data import aligned
 from passiflex.native.lane_source import lane_source
 
 OVER = """
@@ -34,9 +35,9 @@ class LaneCalls:
         f = self.functions[name]
         groups = -(-len(x) // self.width)
         padded = np.concatenate([x, np.tile(x[-1:], (groups * self.width - len(x), 1))])
-        inputs = aligned((groups, x.shape[1], self.width))
+        inputs = aligned("room", None, (groups, x.shape[1], self.width))
         inputs[...] = padded.reshape(groups, self.width, -1).transpose(0, 2, 1)
-        outputs = aligned((groups, f.size1_out(0), self.width))
+        outputs = aligned("room", None, (groups, f.size1_out(0), self.width))
         routine = self.library[f"{name}_over"]
         routine.argtypes, routine.restype = [ctypes.c_longlong, ctypes.c_void_p, ctypes.c_void_p], None
         routine(groups, inputs.ctypes.data, outputs.ctypes.data)
@@ -46,14 +47,6 @@ class LaneCalls:
         """Return the same by CasADi's virtual machine."""
         f = self.functions[name]
         return f.map(len(x))(x.T).full().T
-
-
-def aligned(shape: tuple[int, ...]) -> np.ndarray:
-    """Return room for numbers that begins at a multiple of 64 bytes."""
-    size = int(np.prod(shape))
-    room = np.full(size + 8, np.nan)
-    start = -room.ctypes.data % 64 // 8
-    return room[start : start + size].reshape(shape)
 
 
 def units(ours: np.ndarray, exact: np.ndarray) -> np.ndarray:

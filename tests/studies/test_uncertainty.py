@@ -11,7 +11,9 @@ import pytest
 from passiflex.campaigns import columns, draws, require_possible, sample_scenario
 from passiflex.control.law import ImpedanceLaw
 from passiflex.control.rigid import RigidImpedanceLaw
+from passiflex.limits.workspace import REGULAR
 from passiflex.simulation import resolve
+from passiflex.simulation.posture import posture
 from passiflex.studies.reproduce import reproduce
 from passiflex.studies.uncertainty import (
     RESPONSE,
@@ -61,12 +63,19 @@ def test_what_is_believed_and_what_is_true() -> None:
 
 
 def test_the_workspace_is_away_from_singular_postures() -> None:
+    """The ratio of the singular values of J, lengths in units of the reach, is half of what `limits` calls regular."""
     campaign = uncertainty_campaign("recommended_workspace")
-    for i in range(50):
-        problem = resolve(sample_scenario(campaign, i))
-        start = dict(zip(columns(campaign), draws(campaign, [i])[0], strict=True))
-        assert problem.q.tolist() == [start[f"posture.{joint}"] for joint in range(1, 8)]
-    assert len(WORKSPACE) == 7
+    drawn = draws(campaign, range(300))
+    where = [columns(campaign).index(f"posture.{joint}") for joint in range(1, 8)]
+    problem = resolve(sample_scenario(campaign, 7))
+    np.testing.assert_array_equal(problem.q, drawn[7, where])
+    robot = problem.law.robot
+    jacobians = [posture(robot, q, robot.nominal()).jacobian for q in drawn[:, where]]
+    reach = max(np.linalg.norm(J[:3], axis=0).max() for J in jacobians)
+    units = np.array([1 / reach] * 3 + [1.0] * 3)[:, None]
+    values = np.array([np.linalg.svd(units * J, compute_uv=False) for J in jacobians])
+    assert (values[:, -1] / values[:, 0]).min() > REGULAR / 2
+    assert len(WORKSPACE) == robot.n
 
 
 @pytest.mark.slow

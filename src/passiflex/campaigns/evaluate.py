@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Callable, Sequence
-from functools import lru_cache, partial
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -76,13 +76,11 @@ def evaluate_samples(text: str, samples: Sequence[int]) -> list[dict[str, Any]]:
         measured = measures(problem, step_window(scenario), run)
         return {name: measured[name] for name in kept} | _kept_response(campaign, run)
 
-    problems = [p for *_, p in ready]
-    try:
-        done = _digested(problems, row)
-    except CANNOT_RUN:  # one that cannot be run must not take the others with it: each alone
-        done = [_alone(campaign, p, partial(row, k)) for k, p in enumerate(problems)]
-    for (i, *_), measured in zip(ready, done, strict=True):
-        rows[i] |= measured
+    def measured(which: Sequence[int]) -> list[dict[str, Any]]:
+        return _digested([ready[k][2] for k in which], lambda k, run: row(which[k], run))
+
+    for (i, *_), found in zip(ready, together_or_alone(measured, len(ready)), strict=True):
+        rows[i] |= found if isinstance(found, dict) else _refused(campaign, str(found))
     return [rows[i] for i in samples]
 
 
@@ -91,6 +89,23 @@ def evaluate_problems(problems: Sequence[Problem], scenarios: Sequence[Scenario]
     return _digested(
         problems, lambda k, run: measures(problems[k], step_window(scenarios[k]), run), threads=usable_cores()
     )
+
+
+def together_or_alone(
+    run: Callable[[Sequence[int]], list[dict[str, Any]]], count: int
+) -> list[dict[str, Any] | PassiflexError]:
+    """Return what `run` makes of the numbers below `count`; of one that cannot be run, why.
+
+    They are run together, and each alone if one of them cannot be: it does not take the others with it.
+    """
+    try:
+        return list(run(range(count)))
+    except CANNOT_RUN as error:
+        return [error] if count == 1 else [_one(run, k) for k in range(count)]
+
+
+def _one(run: Callable[[Sequence[int]], list[dict[str, Any]]], k: int) -> dict[str, Any] | PassiflexError:
+    return together_or_alone(lambda _: run([k]), 1)[0]
 
 
 def kept_measures(campaign: Campaign) -> tuple[str, ...]:
@@ -157,15 +172,6 @@ def _digested(problems: Sequence[Problem], digest: Digest, *, threads: int = 1) 
         )
     )
     return [done[k] if k in done else digest(k, simulate_problem(p)) for k, p in enumerate(problems)]
-
-
-def _alone(
-    campaign: Campaign, problem: Problem, digest: Callable[[Signals], dict[str, Any]]
-) -> dict[str, Any]:
-    try:
-        return _digested([problem], lambda _, run: digest(run))[0]
-    except CANNOT_RUN as error:
-        return _refused(campaign, str(error))
 
 
 def _refused(campaign: Campaign, why: str) -> dict[str, Any]:

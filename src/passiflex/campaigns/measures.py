@@ -64,6 +64,13 @@ MEASURES = {
 }
 """What can be kept and asked for, by name."""
 
+
+def with_unit(measure: str) -> str:
+    """Return the name of a measure as people read it, with its unit."""
+    unit = MEASURES[measure].unit
+    return measure.replace("_", " ") + ("" if unit == "1" else f" [{unit}]")
+
+
 SIGNALS = (
     "position", "desired_position", "q", "dq", "tau_m",
     "link_kinetic_energy", "motor_kinetic_energy", "joint_spring_energy", "potential_energy",

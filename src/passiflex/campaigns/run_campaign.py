@@ -60,8 +60,8 @@ class Results:
 
     def narrow_rows(self) -> pa.Table:
         """Return the rows without the responses, which are wide."""
-        known = next(read_blocks(self.folder)).column_names
-        return self.rows([name for name in known if not name.startswith(RESPONSE)])
+        first = next(read_blocks(self.folder), None)
+        return self.rows(first and [name for name in first.column_names if not name.startswith(RESPONSE)])
 
     def responses(self) -> Iterator[pa.Table]:
         """Yield verdicts and responses, some samples at a time; nothing if no responses are kept."""
@@ -112,7 +112,7 @@ def run_campaign(
     if samples is not None:
         if not 1 <= samples <= MOST_SAMPLES:
             raise ValueRangeError("number of samples", got=samples, needs=f"1 to {MOST_SAMPLES}")
-        campaign = parse_campaign(_with_samples(campaign, samples), source="campaign")
+        campaign = campaign.model_copy(update={"samples": samples})
     require_response(campaign)
     with _engine(workers, scheduler) as engine:  # first, as a scheduler that is not there is soon found out
         require_possible(campaign)
@@ -183,11 +183,6 @@ def _ready(campaign: Campaign) -> str:
         if find_compiler() is not None:  # without one the samples run one by one
             lane_loop(base)
     return robot_digest(campaign)
-
-
-def _with_samples(campaign: Campaign, samples: int) -> str:
-    """Return the campaign's text with another number of samples."""
-    return yaml.safe_dump(yaml.safe_load(campaign.to_yaml()) | {"samples": samples}, sort_keys=False)
 
 
 def _identity(campaign: Campaign) -> str:

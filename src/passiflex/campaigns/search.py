@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from passiflex.campaigns.box import Box
 from passiflex.campaigns.campaign import Campaign
-from passiflex.campaigns.evaluate import CANNOT_RUN, evaluate_problems
+from passiflex.campaigns.evaluate import evaluate_problems, together_or_alone
 from passiflex.campaigns.found import Best, Case, Found, case_scenario
 from passiflex.campaigns.measures import MEASURES
 from passiflex.campaigns.samples import values_of_row, with_values
@@ -219,11 +219,11 @@ class _Trials:
 
 def _measured(ready: list[_Ready]) -> list[dict[str, float | str] | None]:
     """Return the measures of each; None where the problem cannot be run, which does not take others with it."""
-    try:
-        found = evaluate_problems([p for *_, p in ready], [case.scenario for _, case, _ in ready])
-    except CANNOT_RUN:
-        return [None] if len(ready) == 1 else [_measured([one])[0] for one in ready]
-    return list(found)
+
+    def run(which: Sequence[int]) -> list[dict[str, float | str]]:
+        return evaluate_problems([ready[k][2] for k in which], [ready[k][1].scenario for k in which])
+
+    return [found if isinstance(found, dict) else None for found in together_or_alone(run, len(ready))]
 
 
 def _bytes(point: Array) -> bytes:

@@ -9,7 +9,7 @@ from rich.table import Column, Table
 
 from passiflex.campaigns.found import Found
 from passiflex.campaigns.importance import Association, Index
-from passiflex.campaigns.measures import MEASURES
+from passiflex.campaigns.measures import with_unit
 from passiflex.campaigns.samples import Values
 from passiflex.campaigns.statistics import Statistics
 
@@ -133,5 +133,5 @@ def _level(found: Statistics) -> str:
 
 
 def _named(metric: str) -> str:
-    unit = MEASURES[metric].unit
-    return escape(metric.replace("_", " ") + ("" if unit == "1" else f" [{unit}]"))
+    """Return the name of a metric; its unit in brackets is no mark-up."""
+    return escape(with_unit(metric))

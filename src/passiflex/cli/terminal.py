@@ -19,8 +19,6 @@ app = cyclopts.App(
     suppress_keyboard_interrupt=False,  # main says what an interruption means
 )
 console = Console(soft_wrap=True, highlight=False)
-QUIET = 10.0
-"""Time between two lines of progress where there is no terminal [s]."""
 
 
 @contextmanager
@@ -49,7 +47,9 @@ def progress_lines() -> Iterator[Callable[[str], None]]:
 def campaign_bar() -> Iterator[Callable[[Progress], None]]:
     """Give a function that shows how far a campaign is: a bar on a terminal, a line now and then otherwise."""
     if not console.is_terminal:
-        yield _sparse_lines()
+        from passiflex.pieces.run_pieces import sparsely
+
+        yield sparsely(lambda p: console.print(f"{p.done} of {p.total} samples, {_words(p)}"))
         return
     import rich.progress as parts
 
@@ -64,18 +64,6 @@ def campaign_bar() -> Iterator[Callable[[Progress], None]]:
             bar.update(task, total=progress.total, completed=progress.done, description=_words(progress))
 
         yield show
-
-
-def _sparse_lines() -> Callable[[Progress], None]:
-    last = time.monotonic() - QUIET
-
-    def show(progress: Progress) -> None:
-        nonlocal last
-        if time.monotonic() - last >= QUIET or progress.done == progress.total:
-            last = time.monotonic()
-            console.print(f"{progress.done} of {progress.total} samples, {_words(progress)}")
-
-    return show
 
 
 def _words(progress: Progress) -> str:

@@ -13,11 +13,11 @@ from passiflex.native.held_loop import HELD_LOOP_DRIVER as HELD_LOOP_DRIVER
 from passiflex.native.held_loop import HeldLoop as HeldLoop
 from passiflex.native.held_loop import LoopState as LoopState
 from passiflex.native.held_loop import Samples as Samples
-from passiflex.native.lane_loop import Change as Change
+from passiflex.native.lane_data import Change as Change
+from passiflex.native.lane_data import LaneInputs as LaneInputs
+from passiflex.native.lane_data import LaneState as LaneState
 from passiflex.native.lane_loop import LaneFunctions as LaneFunctions
-from passiflex.native.lane_loop import LaneInputs as LaneInputs
 from passiflex.native.lane_loop import LaneLoop as LaneLoop
-from passiflex.native.lane_loop import LaneState as LaneState
 from passiflex.native.library import cache_folder as cache_folder
 from passiflex.native.library import compile_functions as compile_functions
 from passiflex.native.library import compile_source as compile_source

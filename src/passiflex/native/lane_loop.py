@@ -13,70 +13,11 @@ from numpy.typing import ArrayLike, NDArray
 from passiflex.errors import SizeError, ValueRangeError
 from passiflex.native.entry import address
 from passiflex.native.held_loop import LONGEST_LINE, LoopState
+from passiflex.native.lane_data import LaneInputs, LaneSamples, LaneState, aligned
 from passiflex.native.lane_source import lane_source
 from passiflex.native.library import c_source, compile_source
 
 Array = NDArray[np.float64]
-
-
-class Change(NamedTuple):
-    """From this period on, a lane is told these numbers."""
-
-    period: int
-    lane: int
-    told: Array
-
-
-class LaneState(NamedTuple):
-    """Everything that goes from one call to the next; the last axis of all but `line` is the lane.
-
-    Attributes
-    ----------
-    y: States of the plants and their quadratures.
-    controller, signals: As of `LoopState`.
-    line: Commands on their way, a row for each lane.
-    told: What was told last.
-    """
-
-    y: Array
-    controller: Array
-    signals: Array
-    line: Array
-    told: Array
-
-
-class LaneSamples(NamedTuple):
-    """The samples of a stretch.
-
-    Attributes
-    ----------
-    values: What was kept (rows, kept, lanes).
-    completed: For each lane the sample at which its state ceased to be finite, or the number of samples.
-    whole: For each lane the rows before the first of which any number, kept or not, is not finite.
-    state: After the stretch.
-    """
-
-    values: Array
-    completed: NDArray[np.int64]
-    whole: NDArray[np.int64]
-    state: LaneState
-
-
-class LaneInputs(NamedTuple):
-    """What drives the lanes through one stretch of N periods; the last axis is the lane.
-
-    Attributes
-    ----------
-    first: Number of its first period.
-    changes: What is told anew in it, by period.
-    drawn: Numbers of chance (N, n_drawn, lanes).
-    timing: Delay of each command [s] ≥ 0, and whether the controller runs (N, 2, lanes).
-    """
-
-    first: int
-    changes: Sequence[Change]
-    drawn: Array
-    timing: Array
 
 
 class _Run(ctypes.Structure):
@@ -223,22 +164,22 @@ class LaneLoop:
         for change in inputs.changes:
             _require_range("lane of a change", change.lane, 0 <= change.lane < w, f"below {w}")
         arrays = {
-            "y": _aligned("y", state.y, (self.n_x + self.n_q, w)),
-            "c": _aligned("controller", state.controller, (self.n_c, w)),
-            "z": _aligned("signals", state.signals, (self.n_z, w)),
-            "line": _aligned("line", state.line, (w, self.n_line)),
-            "told": _aligned("told", state.told, (self.n_told, w)),
-            "drawn": _aligned("drawn", inputs.drawn, (n, self.n_drawn, w)),
-            "timing": _aligned("timing", inputs.timing, (n, 2, w)),
-            "p_plant": _aligned("p_plant", p_plant, (self.n_p_plant, w)),
-            "p_control": _aligned("p_control", p_control, (self.n_p_control, w)),
-            "longest": _aligned("longest", longest, (w,)),
-            "out": _aligned("out", None, (-(-n // record_every), kept.size, w)),
+            "y": aligned("y", state.y, (self.n_x + self.n_q, w)),
+            "c": aligned("controller", state.controller, (self.n_c, w)),
+            "z": aligned("signals", state.signals, (self.n_z, w)),
+            "line": aligned("line", state.line, (w, self.n_line)),
+            "told": aligned("told", state.told, (self.n_told, w)),
+            "drawn": aligned("drawn", inputs.drawn, (n, self.n_drawn, w)),
+            "timing": aligned("timing", inputs.timing, (n, 2, w)),
+            "p_plant": aligned("p_plant", p_plant, (self.n_p_plant, w)),
+            "p_control": aligned("p_control", p_control, (self.n_p_control, w)),
+            "longest": aligned("longest", longest, (w,)),
+            "out": aligned("out", None, (-(-n // record_every), kept.size, w)),
         }
         changes = sorted(inputs.changes, key=lambda change: change.period)
         told = np.zeros((len(changes), self.n_told))
         for i, c in enumerate(changes):
-            told[i] = _aligned("told in a change", c.told, (self.n_told,))
+            told[i] = aligned("told in a change", c.told, (self.n_told,))
         when = np.array([(c.period, c.lane, i) for i, c in enumerate(changes)], dtype=np.int64)
         kept = np.ascontiguousarray(kept, dtype=np.int64)
         completed, whole = np.zeros(w, dtype=np.int64), np.zeros(w, dtype=np.int64)
@@ -286,15 +227,3 @@ def _require_fit(f: LaneFunctions, n: LaneLoop) -> None:
             raise SizeError(f"{name} does not fit", got=g, needs=f"dense columns of sizes {sizes}")
     if not 0 <= n.n_s <= n.n_w:
         raise SizeError("rows do not fit", got=f"{n.n_w} numbers", needs=f"{n.n_s} surroundings first")
-
-
-def _aligned(name: str, value: Array | None, shape: tuple[int, ...]) -> Array:
-    """Return a copy whose numbers start where wide registers want them; NaN for no value."""
-    if value is not None and np.shape(value) != shape:
-        raise SizeError(name, got=np.shape(value), needs=f"shape {shape}")
-    size = int(np.prod(shape))
-    room = np.empty(size + 8)
-    start = -room.ctypes.data % 64 // 8
-    copy = room[start : start + size].reshape(shape)
-    copy[...] = np.nan if value is None else value
-    return copy

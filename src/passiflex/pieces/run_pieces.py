@@ -15,6 +15,9 @@ from passiflex.pieces.source import source_digest
 from passiflex.pieces.store import Store
 from passiflex.pieces.worker import EngineError
 
+QUIET = 10.0
+"""Time between two lines of progress where they are not to be many [s]."""
+
 
 class PieceError(PassiflexError):
     """Samples that cannot be evaluated; the traceback is in the notes."""
@@ -36,6 +39,19 @@ class Progress(NamedTuple):
     rate: float
     remaining: float
     verdicts: dict[str, int]
+
+
+def sparsely(show: Callable[[Progress], None]) -> Callable[[Progress], None]:
+    """Return a function that shows the first progress, the last, and one now and then between."""
+    last = time.monotonic() - QUIET
+
+    def on_progress(progress: Progress) -> None:
+        nonlocal last
+        if time.monotonic() - last >= QUIET or progress.done == progress.total:
+            last = time.monotonic()
+            show(progress)
+
+    return on_progress
 
 
 def run_pieces(

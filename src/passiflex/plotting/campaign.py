@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from passiflex.campaigns.intervals import Share
-from passiflex.campaigns.measures import MEASURES
+from passiflex.campaigns.measures import with_unit
 from passiflex.campaigns.page import Band, Bars, Ecdf, Page, Scatter
 from passiflex.plotting.figures import Curve
-from passiflex.plotting.style import LINES, figure_style
+from passiflex.plotting.style import BLUE, LINES, figure_style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -27,7 +27,6 @@ VERDICTS: dict[str, dict[str, Any]] = {
 """Told apart by colour, also by those who see fewer, and by shape."""
 MORE, LESS, DIFFERENT = "#0072b2", "#d55e00", "0.45"
 """Colours of the bars: the metric rises with the parameter, falls, differs between words."""
-BLUE = "#0b3fd1"
 
 
 def draw_campaign(page: Page, lines: Mapping[str, Curve] | None = None) -> Figure:
@@ -67,6 +66,14 @@ def _row(part: SubFigure, count: int) -> list[Axes]:
     return axes
 
 
+def draw_band(axes: Axes, band: Band) -> None:
+    """Draw the median of responses and where half and nine tenths of them are."""
+    low, lower, median, upper, high = band.quantiles
+    axes.fill_between(band.time, low, high, color=BLUE, alpha=0.15, lw=0, label="5 to 95 %")
+    axes.fill_between(band.time, lower, upper, color=BLUE, alpha=0.3, lw=0, label="25 to 75 %")
+    axes.plot(band.time, median, color=BLUE, lw=1.3, label="median")
+
+
 def _shares(axes: Axes, shares: tuple[Share, ...]) -> None:
     for row, share in enumerate(shares):
         color = VERDICTS.get(share.name, {}).get("color", "0.35")
@@ -88,10 +95,7 @@ def _band(axes: Axes, band: Band | None, lines: Mapping[str, Curve]) -> None:
     if band is None:
         _nothing(axes, "no responses to a step were kept")
         return
-    low, lower, median, upper, high = band.quantiles
-    axes.fill_between(band.time, low, high, color=BLUE, alpha=0.15, lw=0, label="5 to 95 %")
-    axes.fill_between(band.time, lower, upper, color=BLUE, alpha=0.3, lw=0, label="25 to 75 %")
-    axes.plot(band.time, median, color=BLUE, lw=1.3, label="median")
+    draw_band(axes, band)
     for name, curve in lines.items():
         axes.plot(curve.time, curve.values, **LINES[name] | {"lw": 1.0})
     axes.set_xlabel("time [s]")
@@ -104,7 +108,7 @@ def _ecdf(axes: Axes, ecdf: Ecdf | None) -> None:
     if ecdf is None:
         _nothing(axes, "no metric was kept that is drawn here")
         return
-    name = _named(ecdf.metric)
+    name = with_unit(ecdf.metric)
     if ecdf.values.size:
         axes.step(ecdf.values, ecdf.shares, where="post", color=BLUE, lw=1.3)
     else:
@@ -162,14 +166,9 @@ def _scatter(axes: Axes, scatter: Scatter | None) -> None:
         axes.set_xticks(range(len(scatter.words)), scatter.words)
         axes.set_xlim(-0.6, len(scatter.words) - 0.4)
     axes.set_xlabel(scatter.parameter)
-    axes.set_ylabel(_named(scatter.metric))
+    axes.set_ylabel(with_unit(scatter.metric))
     axes.set_title("the most important parameter")
     axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), handletextpad=0.1)
-
-
-def _named(metric: str) -> str:
-    unit = MEASURES[metric].unit
-    return metric.replace("_", " ") + ("" if unit == "1" else f" [{unit}]")
 
 
 def _nothing(axes: Axes, why: str) -> None:

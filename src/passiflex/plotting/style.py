@@ -23,6 +23,8 @@ LINES: dict[str, dict[str, Any]] = {
     "robot": {"color": "#0b3fd1", "lw": 1.4, "ls": "--", "label": "robot H₁"},
     "tank": {"color": "#c800a1", "lw": 1.4, "ls": "-.", "label": "tank T"},
 }
+BLUE = "#0b3fd1"
+"""Of what this package proposes, and of all that stands alone."""
 JOINTS = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#000000", "#999999"]
 
 

@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from passiflex.campaigns.intervals import Share
 from passiflex.campaigns.page import Band, Ecdf
+from passiflex.plotting.campaign import draw_band
 from passiflex.plotting.figures import Curve
-from passiflex.plotting.style import JOINTS, LINES, figure_style
+from passiflex.plotting.style import BLUE, JOINTS, LINES, figure_style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-BLUE = "#0b3fd1"
 STYLES = ("-", "--", "-.", ":", "-", "--", "-.")
 SHOWN = {
     "passive": "passive",
@@ -72,10 +72,7 @@ def draw_uncertainty(columns: Sequence[UncertainColumn], conditions: str) -> Fig
 def _response(axes: Axes, column: UncertainColumn) -> None:
     axes.set_title(column.title.replace(", ", ",\n", 1), fontsize=8)
     if column.band is not None:
-        low, lower, median, upper, high = column.band.quantiles
-        axes.fill_between(column.band.time, low, high, color=BLUE, alpha=0.15, lw=0)
-        axes.fill_between(column.band.time, lower, upper, color=BLUE, alpha=0.35, lw=0)
-        axes.plot(column.band.time, median, color=BLUE, lw=1.2)
+        draw_band(axes, column.band)
     axes.plot(column.ideal.time, column.ideal.values, **LINES["msd"] | {"lw": 0.9})
     axes.set_xlim(column.begin - 0.2, min(column.end, column.begin + 5.0))
     axes.set_xlabel("time [s]")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -16,7 +15,7 @@ from passiflex.campaigns.intervals import Share, share_of
 from passiflex.campaigns.page import Page, ideal_along, page
 from passiflex.campaigns.statistics import Statistics, numbers_of, statistics
 from passiflex.files import require_writable
-from passiflex.pieces.run_pieces import Progress
+from passiflex.pieces.run_pieces import Progress, sparsely
 from passiflex.plotting.figures import Curve, save_figure
 from passiflex.plotting.uncertainty import UncertainColumn, draw_uncertainty
 from passiflex.responses.steps import step_window
@@ -52,8 +51,6 @@ IDEAL_RATE = 4000.0
 """Rate at which the baseline, whose gains are low, is as good as continuous, and a tenth of the work [Hz]."""
 LEVEL = 0.95
 """Of the intervals."""
-QUIET = 10.0
-"""Time between two reports of a campaign [s]."""
 CONDITIONS = (
     "Fig. 3's step of 0.1 m, {samples} robots each: K, D and B of each joint and the inertia of each link uniform "
     "within ±50 % of the description, which the law goes by\n"
@@ -145,9 +142,12 @@ def reproduce_uncertainty(
     for name in WAYS:
         campaign = uncertainty_campaign(name, samples)
         done = folder / campaign.name
-        results = run_campaign(
-            campaign, done, workers=workers, on_progress=_sparsely(report, campaign.description)
-        )
+
+        def show(progress: Progress, title: str = campaign.description) -> None:
+            left = f"{progress.done} of {progress.total}, {progress.remaining:.0f} s left"
+            report(f"uncertainty, {title}: {left}")
+
+        results = run_campaign(campaign, done, workers=workers, on_progress=sparsely(show))
         rows = results.rows()
         found = statistics(campaign, rows, level=LEVEL)
         summary[campaign.name] = _numbers(found)
@@ -188,17 +188,3 @@ def _column(campaign: Campaign, drawn: Page, at_limit: Share) -> UncertainColumn
         overshoot=by_metric["overshoot"],
         margin=by_metric["margin"],
     )
-
-
-def _sparsely(report: Report, title: str) -> Callable[[Progress], None]:
-    last = time.monotonic() - QUIET
-
-    def on_progress(progress: Progress) -> None:
-        nonlocal last
-        if time.monotonic() - last >= QUIET or progress.done == progress.total:
-            last = time.monotonic()
-            report(
-                f"uncertainty, {title}: {progress.done} of {progress.total}, {progress.remaining:.0f} s left"
-            )
-
-    return on_progress
