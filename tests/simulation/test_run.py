@@ -5,8 +5,10 @@ from __future__ import annotations
 import re
 from functools import lru_cache
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
+import casadi as cs
 import h5py
 import numpy as np
 import pytest
@@ -16,8 +18,11 @@ import yaml
 from passiflex.errors import RunFileError, SimulationError
 from passiflex.files import OutputError
 from passiflex.passivity import audit
+from passiflex.robots.arm import SerialArm
+from passiflex.robots.chain import SerialChain
 from passiflex.simulation import Run, Scenario, parse_scenario, simulate
-from passiflex.simulation.run import FORMAT, package_version, source_commit
+from passiflex.simulation.run import package_version, source_commit
+from passiflex.simulation.run_file import FORMAT
 
 PLANAR = """\
 name: planar
@@ -164,6 +169,19 @@ def test_the_stored_configuration_is_complete() -> None:
     assert configuration["tolerance"] == 1e-9
 
 
+def test_the_file_holds_the_arm_with_its_tool() -> None:
+    """Its forward kinematics are the recorded pose, whoever reads them."""
+    tool = {"position": [0.1, 0.0, 0.2], "rotation_vector": [0.3, 0.0, 0.0]}
+    run = simulate(planar(tool=tool))
+    arm = SerialArm(SerialChain.from_urdf(run.data.attrs["robot_description"]))
+    q, m = cs.SX.sym("q", 2), SimpleNamespace(**{k: cs.SX(cs.DM(v)) for k, v in arm.nominal().items()})
+    pose_of = cs.Function("pose", [q], list(arm.pose(q, m)))
+    for row in (0, 50, 100):
+        position, rotation = pose_of(run["q"][row])
+        np.testing.assert_allclose(position.full()[:, 0], run["position"][row], rtol=0, atol=1e-12)
+        np.testing.assert_allclose(rotation.full(), run["rotation"][row], rtol=0, atol=1e-12)
+
+
 def test_version_commit_and_seed_lie_beside_the_result() -> None:
     attributes = simulate(planar(noise=NOISE, seed=7)).data.attrs
     assert attributes["version"] == package_version()
@@ -192,17 +210,17 @@ def refused(path: Path) -> str:
 
 def test_files_that_are_no_netcdf(tmp_path: Path) -> None:
     run = planar_run().save(tmp_path / "run.nc").read_bytes()
-    contents = {
-        "text.nc": b"time,q\n0,1\n",
-        "empty.nc": b"",
-        "half.nc": run[: len(run) // 2],
-        "almost.nc": run[:-1],
-        "head.nc": run[:8],
-    }
-    for name, content in contents.items():
+    foreign = {"text.nc": b"time,q\n0,1\n", "empty.nc": b""}
+    short = {"half.nc": run[: len(run) // 2], "almost.nc": run[:-1], "head.nc": run[:8]}
+    for name, content in (foreign | short).items():
         path = tmp_path / name
         path.write_bytes(content)
-        assert refused(path).startswith(f"{path} is not a netCDF file, or is cut short; got ")
+        expected = (
+            "is not a netCDF-4 file; got "
+            if name in foreign
+            else f"is a netCDF file that is cut short or damaged; got {len(content)} bytes, "
+        )
+        assert refused(path).startswith(f"{path} {expected}")
 
 
 @pytest.mark.parametrize("name", ["none.nc", ".", "none/run.nc"])

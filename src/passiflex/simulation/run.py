@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -18,11 +18,11 @@ from numpy.typing import NDArray
 from passiflex.errors import RunFileError
 from passiflex.files import whole_file
 from passiflex.layout import Field, Layout
+from passiflex.simulation.run_file import FORMAT, defects, foreign, require_file, unreadable
 
 if TYPE_CHECKING:
     from passiflex.simulation.problem import Problem
 
-FORMAT = "passiflex run 1"
 AXES = {
     "position": ("axis",),
     "desired_position": ("axis",),
@@ -33,39 +33,6 @@ AXES = {
     "governed_rotation": ("axis", "column"),
     "held_stiffness": ("task_row", "task_column"),
 }
-PHYSICAL = (
-    "tank_energy",
-    "external_energy",
-    "motor_energy",
-    "joint_energy",
-    "joint_loss_energy",
-    "reference_energy",
-    "link_kinetic_energy",
-    "motor_kinetic_energy",
-    "joint_spring_energy",
-    "potential_energy",
-    "compensated_energy",
-    "shaped_kinetic_energy",
-    "shaped_spring_energy",
-    "cartesian_spring_energy",
-    "gravity_storage",
-    *(f"{flow}_power" for flow in ("external", "motor", "joint", "joint_loss")),
-)
-"""What the energy balances of any run are made of."""
-SAMPLED = (
-    *PHYSICAL,
-    "friction_energy",
-    "friction_power",
-    "law_storage",
-    *(f"{flow}_energy" for flow in ("measured_port", "granted", "drawn", "refilled", "spilled")),
-)
-CONTINUOUS = (
-    *PHYSICAL,
-    "drawn_energy",
-    "spilled_energy",
-    *(f"{flow}_power" for flow in ("reference", "drawn", "spilled")),
-)
-ATTRIBUTES = ("name", "failure", "events", "has_tank", "configuration", "control_period")
 COORDINATES = {
     "axis": ["x", "y", "z"],
     "column": ["x", "y", "z"],
@@ -138,30 +105,20 @@ class Run:
         Raises
         ------
         RunFileError
-            If the file is not there, or is not a run of this package.
+            If the file is not there, or is not a run of this package; `salvage` reads what is left of one.
         """
         path = Path(path)
-        if not path.is_file():
-            raise RunFileError(f"no such file: {path}", try_="passiflex simulate SCENARIO.yaml --out RUN.nc")
+        require_file(path)
         try:
             data = xr.load_dataset(path, engine="h5netcdf")
         except Exception as error:  # the readers raise many kinds for a file that is no netCDF
-            raise RunFileError(
-                f"{path} is not a netCDF file, or is cut short", got=type(error).__name__
-            ) from error
+            raise unreadable(path, error) from error
         if data.attrs.get("format") != FORMAT:
-            raise RunFileError(
-                f"{path} is not a run of this version",
-                got=data.attrs.get("format", "no format"),
-                needs=repr(FORMAT),
-            )
-        needed = (*(SAMPLED if data.attrs.get("control_period") else CONTINUOUS), "time")
-        missing = [name for name in needed if name not in data]
-        missing += [name for name in ATTRIBUTES if name not in data.attrs]
+            raise foreign(path, data)
+        missing, broken = defects(data)
         if missing or not data.sizes.get("time"):
             got = f"no {', '.join(missing)}" if missing else "no rows"
             raise RunFileError(f"{path} is not a complete run", got=got)
-        broken = [name for name in needed if not np.isfinite(data[name].to_numpy()).all()]
         if broken:
             raise RunFileError(f"{path} has numbers that are not finite", got=f"in {', '.join(broken)}")
         return cls(data)
@@ -208,6 +165,7 @@ def assemble(
         "format": FORMAT,
         "name": problem.name,
         "robot": robot.name,
+        "robot_description": _description(problem),
         "law": type(problem.law).__name__,
         "configuration": problem.configuration,
         "sources": json.dumps(robot.sources, ensure_ascii=False),
@@ -222,6 +180,14 @@ def assemble(
         "tolerance": problem.tolerance,
     }
     return Run(xr.Dataset(variables, coordinates, attributes))
+
+
+def _description(problem: Problem) -> str:
+    """Return the robot with its tool as URDF, so that whoever has the file can draw it."""
+    robot = problem.law.robot
+    plant = robot.layout.unpack(problem.plant)
+    arm = replace(robot.arm.chain, tip_xyz=plant["tool_position"], tip_rotation=plant["tool_rotation"])
+    return arm.to_urdf()
 
 
 def _dims(f: Field) -> tuple[str, ...]:

@@ -1,0 +1,133 @@
+"""Reading what is left of a damaged run, to look at it; whoever judges a run reads it by `Run.load`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from passiflex.errors import RunFileError
+from passiflex.simulation.run import Run
+from passiflex.simulation.run_file import FORMAT, foreign, require_file, unreadable
+
+KIND = FORMAT.rsplit(" ", 1)[0]
+DEFAULTS: dict[str, Any] = {
+    "name": "a run without a name",
+    "failure": "",
+    "events": "[]",
+    "configuration": "",
+    "control_period": 0.0,
+    "duration": 0.0,
+}
+"""What stands in for attributes that a run lacks."""
+SHOWN = ("q", "position", "tank_energy", "tau_m")
+"""Without any of these there is nothing to look at."""
+
+
+class Salvaged(NamedTuple):
+    """What could be read of a run, and a sentence on each thing that is wrong with it."""
+
+    run: Run
+    notices: tuple[str, ...]
+
+
+def salvage(path: str | Path) -> Salvaged:
+    """Read as much of a run as is there; a run without damage has no notices.
+
+    Rows end before the first instant that is no number or does not follow the one before. Signals that
+    cannot be read are left out; numbers that are not finite stay where they are.
+
+    Raises
+    ------
+    RunFileError
+        If the file is not there, is no run of any version, or holds nothing that can be shown.
+    """
+    path = Path(path)
+    require_file(path)
+    notices: list[str] = []
+    data = _readable(path, notices)
+    if not str(data.attrs.get("format", "")).startswith(f"{KIND} "):
+        raise foreign(path, data)
+    if data.attrs["format"] != FORMAT:
+        notices.append(
+            f"The file is a {data.attrs['format']!r}, not a {FORMAT!r}: shown is what has the same name in both."
+        )
+    data = _with_attributes(data, notices)
+    data = _rows_in_order(data, notices)
+    if not data.sizes.get("time") or not any("time" in data[name].dims for name in SHOWN if name in data):
+        got = "no rows" if not data.sizes.get("time") else f"none of {', '.join(SHOWN)}"
+        raise RunFileError(f"{path} holds nothing that can be shown", got=got)
+    _note_gaps(data, notices)
+    _note_end(data, notices)
+    return Salvaged(Run(data), tuple(notices))
+
+
+def _readable(path: Path, notices: list[str]) -> xr.Dataset:
+    """Return the variables that can be read, one by one: damage in one leaves the others."""
+    try:
+        with xr.open_dataset(path, engine="h5netcdf") as opened:
+            lost = []
+            for name in opened.variables:
+                try:
+                    opened[name].load()
+                except Exception:  # the readers raise many kinds for damaged bytes
+                    lost.append(str(name))
+            if "time" in lost:
+                raise RunFileError(f"{path} holds nothing that can be shown", got="unreadable time")
+            data = opened.drop_vars(lost).load()
+    except RunFileError:
+        raise
+    except Exception as error:
+        raise unreadable(path, error) from error
+    if lost:
+        notices.append(f"The file is damaged: {', '.join(lost)} could not be read.")
+    return data
+
+
+def _with_attributes(data: xr.Dataset, notices: list[str]) -> xr.Dataset:
+    defaults = DEFAULTS | {"has_tank": int("tank_energy" in data)}
+    absent = {name: value for name, value in defaults.items() if name not in data.attrs}
+    if absent:
+        notices.append(f"The file does not say its {', '.join(absent)}.")
+    return data.assign_attrs(absent)
+
+
+def _rows_in_order(data: xr.Dataset, notices: list[str]) -> xr.Dataset:
+    if not data.sizes.get("time") or "time" not in data.variables:
+        return data
+    time = data["time"].to_numpy()
+    good = np.isfinite(time) & np.append(True, np.diff(time) > 0)
+    if good.all():
+        return data
+    count = int(np.argmin(good))
+    notices.append(f"Time goes wrong after row {count} of {time.size}: shown are the rows before.")
+    return data.isel(time=slice(None, count))
+
+
+def _note_gaps(data: xr.Dataset, notices: list[str]) -> None:
+    """Say which signals have numbers that are not finite, and from when."""
+    first: dict[str, float] = {}
+    for name, values in data.data_vars.items():
+        if "time" in values.dims and values.dtype.kind == "f":
+            finite = np.isfinite(values.to_numpy()).reshape(data.sizes["time"], -1).all(axis=1)
+            if not finite.all():
+                first[str(name)] = float(data["time"][int(np.argmin(finite))])
+    if first:
+        signals = ", ".join(f"{name} (first at {at:.4g} s)" for name, at in first.items())
+        notices.append(f"Numbers that are not finite, shown as gaps: {signals}.")
+
+
+def _note_end(data: xr.Dataset, notices: list[str]) -> None:
+    end, wanted = float(data["time"][-1]), float(data.attrs["duration"])
+    if data.attrs["failure"]:
+        notices.append(f"The run ended early, at {end:.4g} s of {wanted:.4g} s: {data.attrs['failure']}.")
+    elif end < wanted * (1 - 1e-9) - _row(data):
+        notices.append(f"The run is cut short: it ends at {end:.4g} s of {wanted:.4g} s.")
+
+
+def _row(data: xr.Dataset) -> float:
+    """Return the distance of rows [s]: a run that is thinned out may end one row before its duration."""
+    time = data["time"].to_numpy()
+    return float(time[-1] - time[-2]) if time.size > 1 else 0.0
