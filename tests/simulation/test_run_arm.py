@@ -1,0 +1,96 @@
+"""The arm of a run: from its own description, or from the catalogue and the tool of its configuration."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+import pytest
+
+from passiflex.robots.catalogue import read_description
+from passiflex.robots.frames import world_frames
+from passiflex.simulation import Run, parse_scenario, simulate
+from passiflex.simulation.run_arm import chain_of
+
+SCENARIO = """\
+name: planar
+robot: planar2r
+tool: {position: [0.05, 0, 0.02], rotation_vector: [0, 0.3, 0]}
+posture: [0.5, 0.8]
+law:
+  type: impedance
+  task: position
+  gravity: robot
+  shaped_stiffness: {ratio: 2}
+  shaped_inertia: {ratio: 0.5}
+  stiffness: {translation: 60}
+  damping: {translation: 20}
+reference: [{at: 0.1, kind: step, by: [0, 0, 0.05]}]
+duration: 0.4
+output_interval: 0.01
+"""
+
+
+@lru_cache
+def simulated() -> Run:
+    return simulate(parse_scenario(SCENARIO))
+
+
+def changed(**attributes: str | None) -> Run:
+    """Return the run with other attributes; None takes one away."""
+    data = simulated().data.copy()
+    data.attrs = {k: v for k, v in (data.attrs | attributes).items() if v is not None}
+    return Run(data)
+
+
+@pytest.mark.parametrize("description", ["own", None, "<robot", "no URDF"])
+def test_the_arm_puts_the_end_effector_where_it_was_recorded(description: str | None) -> None:
+    run = simulated() if description == "own" else changed(robot_description=description)
+    chain = chain_of(run)
+    assert chain is not None
+    assert chain.name == "planar2r"
+    frames = world_frames(chain, run["q"])
+    np.testing.assert_allclose(frames.position[:, -1], run["position"], atol=1e-12)
+    np.testing.assert_allclose(frames.rotation[:, -1], run["rotation"], atol=1e-12)
+
+
+def test_a_description_of_another_arm_is_not_believed() -> None:
+    """The recorded positions decide: here the catalogue's arm without the tool, and one of seven joints."""
+    planar = read_description("planar2r").chain
+    assert chain_of(changed(robot_description=planar.to_urdf(), robot="somebody's")) is None
+    seven = read_description("iiwa14").chain
+    assert chain_of(changed(robot_description=seven.to_urdf(), robot="iiwa14")) is None
+
+
+@pytest.mark.parametrize(
+    "attributes",
+    [
+        {"robot": "somebody's"},
+        {"robot": "../../etc/robot.yaml"},
+        {"robot": None},
+        {"configuration": "tool: {position: here}"},
+        {"configuration": "{"},
+        {"configuration": "a text"},
+    ],
+)
+def test_a_run_that_does_not_say_what_it_was_has_no_arm(attributes: dict[str, str | None]) -> None:
+    assert chain_of(changed(robot_description=None, **attributes)) is None
+
+
+def test_rows_and_signals_that_are_missing_do_not_hide_the_arm() -> None:
+    data = simulated().data.copy(deep=True)
+    data["q"][:3] = np.nan
+    assert chain_of(Run(data)) is not None
+    data["position"][:] = np.nan
+    assert chain_of(Run(data)) is not None
+    assert chain_of(Run(data.drop_vars("position"))) is not None
+    assert chain_of(Run(data.drop_vars("q"))) is None
+
+
+def test_a_tool_of_a_description_is_kept() -> None:
+    chain = chain_of(simulated())
+    assert chain is not None
+    again = chain_of(changed(robot_description=replace(chain, name="x").to_urdf()))
+    assert again is not None
+    np.testing.assert_array_equal(again.tip_xyz, chain.tip_xyz)
