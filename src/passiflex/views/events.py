@@ -1,0 +1,100 @@
+"""When something happened in a run: what its scenario asked for, and what governor and fallback did."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from passiflex.errors import ScenarioError
+from passiflex.simulation.run import Run
+from passiflex.simulation.scenario import Circle, Force, Hold, Move, Scenario, Step
+from passiflex.simulation.scenario_file import parse_scenario
+from passiflex.views.panel import Array, Mark, Span
+
+APART = 0.05
+"""Two stretches of the governor that are less than this [s] apart are shown as one."""
+
+
+def scenario_of(run: Run) -> Scenario | None:
+    """Return the scenario that a run carries as its resolved configuration; None if it cannot be read."""
+    try:
+        return parse_scenario(str(run.data.attrs["configuration"]), source="the run's configuration")
+    except (KeyError, ScenarioError):
+        return None
+
+
+def marks_of(run: Run) -> tuple[Mark, ...]:
+    """Return the instants at which something happened, in the order of time: reference, forces, gains, fallback."""
+    marks, scenario = [], scenario_of(run)
+    if scenario is not None:
+        marks += [Mark(e.at, _told(e)) for e in scenario.reference]
+        marks += [Mark(s.start, s.label) for s in _forces(scenario)]
+        marks += [Mark(g.at, "gains change") for g in scenario.gains]
+    marks += [Mark(s.start, s.label) for s in _fallback(run)]
+    end = _end(run)
+    return tuple(sorted((m for m in marks if m.time <= end), key=lambda m: m.time))
+
+
+def spans_of(run: Run) -> tuple[Span, ...]:
+    """Return the stretches in which a force acted, the reference was held back, or the law had fallen back."""
+    scenario, end = scenario_of(run), _end(run)
+    forces = _forces(scenario) if scenario is not None else []
+    inside = [s._replace(end=min(s.end, end)) for s in forces if s.start < end]
+    return (*inside, *_governed(run), *_fallback(run))
+
+
+def _end(run: Run) -> float:
+    return float(run.time[-1])
+
+
+def _told(event: Step | Move | Circle | Hold) -> str:
+    if isinstance(event, Step):
+        parts = [f"{np.linalg.norm(event.by):g} m"] if any(event.by) else []
+        parts += [f"{np.linalg.norm(event.turn):.3g} rad"] if any(event.turn) else []
+        return f"step {', '.join(parts)}".strip()
+    if isinstance(event, Move):
+        return f"move {np.linalg.norm(event.by):g} m"
+    return "circle" if isinstance(event, Circle) else "hold"
+
+
+def _forces(scenario: Scenario) -> list[Span]:
+    """Return what acts on the end effector, or is exerted by it, for some time."""
+    spans = [Span(f.start, f.end, _wrench(f), "force") for f in scenario.forces]
+    spans += [Span(f.start, f.end, "feed-forward wrench", "force") for f in scenario.feedforward]
+    return spans + [Span(d.start, d.end, "drag", "force") for d in scenario.drags]
+
+
+def _wrench(force: Force) -> str:
+    parts = [f"force {np.linalg.norm(force.force):.3g} N"] if any(force.force) else []
+    parts += [f"moment {np.linalg.norm(force.moment):.3g} N m"] if any(force.moment) else []
+    return ", ".join(parts) or "force 0 N"
+
+
+def _governed(run: Run) -> list[Span]:
+    """Return when the reference or the stiffness was held back; each stretch lasts until the row after it."""
+    held = np.zeros(run.time.size, dtype=bool)
+    for share in ("reference_share", "stiffness_share"):
+        if share in run.data:
+            held |= run[share] < 1
+    if "governed_time" in run.data:  # also between the rows of a thinned file
+        held[1:] |= np.diff(run["governed_time"]) > 0
+    spans: list[Span] = []
+    for start, end in _stretches(run.time, held):
+        if spans and start - spans[-1].end < APART:
+            spans[-1] = spans[-1]._replace(end=end)
+        else:
+            spans.append(Span(start, end, "reference held back", "governor"))
+    return spans
+
+
+def _fallback(run: Run) -> list[Span]:
+    if "latched" not in run.data or not (run["latched"] > 0).any():
+        return []
+    start = float(run.time[(run["latched"] > 0).argmax()])
+    return [Span(start, _end(run), "fallen back", "fallback")]
+
+
+def _stretches(time: Array, held: Array) -> list[tuple[float, float]]:
+    """Return start and end [s] of each stretch of rows that are held."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], held, [False]]).astype(int)))
+    ends = np.minimum(edges[1::2], time.size - 1)
+    return [(float(time[i]), float(time[j])) for i, j in zip(edges[::2], ends, strict=True)]
