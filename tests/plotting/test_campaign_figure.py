@@ -93,7 +93,7 @@ def test_distributions_are_drawn_as_they_are_and_say_what_is_missing() -> None:
     settling, overshoot = figure.subfigs[1].axes
     np.testing.assert_array_equal(settling.lines[0].get_xydata(), np.column_stack([VALUES, SHARES]))
     assert settling.get_xlabel() == "settling time [s]\n25 % not finite"
-    assert overshoot.get_xlabel() == "overshoot"
+    assert overshoot.get_xlabel() == "overshoot [1]"
 
 
 def test_the_band_lies_between_its_quantiles_with_the_callers_lines() -> None:

@@ -62,7 +62,7 @@ def rigid() -> LimitMap:
 
 
 def panels(figure: Figure) -> list[Axes]:
-    return [axes for axes in figure.axes if axes.get_title() not in ("", "spectral\nradius")]
+    return [axes for axes in figure.axes if axes.get_title() not in ("", "spectral\nradius [1]")]
 
 
 def line(axes: Axes, label: str) -> Line2D:

@@ -36,7 +36,7 @@ def test_a_column_for_each_way_and_the_distributions_below() -> None:
     assert [len(axes.patches) for axes in shares] == [4, 3]
     assert [t.get_text() for t in shares[1].texts] == ["75.0%", "75.0%", "none to fall back to", "75.0%"]
     overshoot, margin = figure.axes[4:]
-    assert [axes.get_xlabel() for axes in (overshoot, margin)] == ["overshoot", "margin [J]"]
+    assert [axes.get_xlabel() for axes in (overshoot, margin)] == ["overshoot [1]", "margin [J]"]
     assert len(overshoot.lines) == len(margin.lines) == 2
     np.testing.assert_array_equal(overshoot.lines[0].get_ydata(), [0.5, 1.0])
     plt.close(figure)

@@ -224,7 +224,7 @@ def _scatter(campaign: Campaign, rows: pa.Table, run: NDArray[np.bool_], found: 
     best = max(of, key=lambda a: a.weight)
     column = next(c for c in drawn_columns(campaign, rows) if c.name == best.column)
     quantity = campaign.targets[best.parameter].quantity
-    unit = f" [{quantity.unit}]" if quantity and quantity.unit not in ("", "1") else ""
+    unit = f" [{quantity.unit or 'SI'}]" if quantity and quantity.unit != "1" else ""
     return Scatter(
         label(campaign, best.parameter, best.joint) + unit,
         column.words,

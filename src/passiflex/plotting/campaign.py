@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from passiflex.campaigns.intervals import Share
-from passiflex.campaigns.measures import with_unit
+from passiflex.campaigns.measures import MEASURES
 from passiflex.campaigns.page import Band, Bars, Ecdf, Page, Scatter
 from passiflex.plotting.figures import Curve
-from passiflex.plotting.style import BLUE, LINES, figure_style
+from passiflex.plotting.style import BLUE, LINES, ROLES, axis_label, figure_style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -20,12 +20,12 @@ if TYPE_CHECKING:
 A4 = (8.27, 11.69)
 """Portrait [in]."""
 VERDICTS: dict[str, dict[str, Any]] = {
-    "passive": {"color": "#0072b2", "marker": "o", "s": 14},
-    "violated": {"color": "#d55e00", "marker": "X", "s": 28},
-    "inconclusive": {"color": "#e69f00", "marker": "s", "s": 18},
+    "passive": {"color": ROLES["passive"].light, "marker": "o", "s": 14},
+    "violated": {"color": ROLES["violated"].light, "marker": "X", "s": 28},
+    "inconclusive": {"color": ROLES["inconclusive"].light, "marker": "s", "s": 18},
 }
 """Told apart by colour, also by those who see fewer, and by shape."""
-MORE, LESS, DIFFERENT = "#0072b2", "#d55e00", "0.45"
+MORE, LESS, DIFFERENT = (ROLES[role].light for role in ("passive", "violated", "neutral"))
 """Colours of the bars: the metric rises with the parameter, falls, differs between words."""
 
 
@@ -86,7 +86,8 @@ def _shares(axes: Axes, shares: tuple[Share, ...]) -> None:
     axes.set_yticks(range(len(shares)), [share.name.replace("_", " ") for share in shares])
     axes.set_ylim(len(shares) - 0.4, -0.6)
     axes.set_xlim(0, 1)
-    axes.set_xticks([0, 0.25, 0.5, 0.75, 1], ["0", "25 %", "50 %", "75 %", "100 %"])
+    axes.set_xticks([0, 0.25, 0.5, 0.75, 1], ["0", "25", "50", "75", "100"])
+    axes.set_xlabel(axis_label("of all samples", "%"))
     axes.set_title("shares, and their intervals")
 
 
@@ -108,7 +109,7 @@ def _ecdf(axes: Axes, ecdf: Ecdf | None) -> None:
     if ecdf is None:
         _nothing(axes, "no metric was kept that is drawn here")
         return
-    name = with_unit(ecdf.metric)
+    name = _measured(ecdf.metric)
     if ecdf.values.size:
         axes.step(ecdf.values, ecdf.shares, where="post", color=BLUE, lw=1.3)
     else:
@@ -117,7 +118,7 @@ def _ecdf(axes: Axes, ecdf: Ecdf | None) -> None:
     axes.set_xlabel(name + (f"\n{100 * ecdf.endless:.3g} % not finite" if ecdf.endless else ""))
     axes.locator_params(axis="x", nbins=4)
     if axes.get_subplotspec().is_first_col():  # type: ignore[union-attr]
-        axes.set_ylabel("share of samples at or below")
+        axes.set_ylabel(axis_label("share of samples at or below", "1"))
 
 
 def _bars(axes: Axes, bars: Bars | None, page: Page) -> None:
@@ -140,6 +141,7 @@ def _bars(axes: Axes, bars: Bars | None, page: Page) -> None:
     axes.set_yticks(range(len(page.columns)), page.columns, fontsize=7)
     axes.set_ylim(len(page.columns) - 0.4, -0.6)
     axes.set_xlim(0, 1.08)
+    axes.set_xlabel(axis_label("strength", "1"))
     axes.grid(visible=False, axis="y")
     axes.set_title(bars.metric.replace("_", " "), fontsize=8)
 
@@ -165,10 +167,20 @@ def _scatter(axes: Axes, scatter: Scatter | None) -> None:
     if scatter.words:
         axes.set_xticks(range(len(scatter.words)), scatter.words)
         axes.set_xlim(-0.6, len(scatter.words) - 0.4)
-    axes.set_xlabel(scatter.parameter)
-    axes.set_ylabel(with_unit(scatter.metric))
+    axes.set_xlabel(_with_unit(scatter))
+    axes.set_ylabel(_measured(scatter.metric))
     axes.set_title("the most important parameter")
     axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), handletextpad=0.1)
+
+
+def _measured(metric: str) -> str:
+    return axis_label(metric.replace("_", " "), MEASURES[metric].unit)
+
+
+def _with_unit(scatter: Scatter) -> str:
+    """Return the parameter with its unit; words have none."""
+    pure = not scatter.words and not scatter.parameter.endswith("]")
+    return axis_label(scatter.parameter, "1") if pure else scatter.parameter
 
 
 def _nothing(axes: Axes, why: str) -> None:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from passiflex.files import whole_file
-from passiflex.plotting.style import JOINTS, LINES, figure_style
+from passiflex.plotting.files import save_as as save_as
+from passiflex.plotting.files import save_figure as save_figure
+from passiflex.plotting.style import JOINT_ROLES, LINES, SIZES, figure_style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 AXES = "XYZ"
-DPI = 200
 
 
 class Curve(NamedTuple):
@@ -52,7 +51,11 @@ def draw_steps(columns: Sequence[StepColumn], conditions: str) -> Figure:
 
     with figure_style():
         figure, grid = plt.subplots(
-            3, len(columns), figsize=(3.6 * len(columns), 5.4), sharex=True, squeeze=False
+            3,
+            len(columns),
+            figsize=(SIZES["double"].width / 2 * len(columns), 5.4),
+            sharex=True,
+            squeeze=False,
         )
         for j, column in enumerate(columns):
             for i in range(3):
@@ -73,7 +76,11 @@ def draw_circle(columns: Sequence[CircleColumn], conditions: str) -> Figure:
 
     with figure_style():
         figure, grid = plt.subplots(
-            4, len(columns), figsize=(3.6 * len(columns), 6.8), sharex=True, squeeze=False
+            4,
+            len(columns),
+            figsize=(SIZES["double"].width / 2 * len(columns), 6.8),
+            sharex=True,
+            squeeze=False,
         )
         for j, c in enumerate(columns):
             for row, axis in ((0, 1), (1, 2)):
@@ -83,33 +90,20 @@ def draw_circle(columns: Sequence[CircleColumn], conditions: str) -> Figure:
             for name, energy in c.energies.items():
                 grid[2, j].plot(c.time, energy, **LINES[name])
             grid[2, j].set_ylabel("energy [J]")
-            grid[2, j].legend(ncols=3, loc="lower center", fontsize=6, handlelength=1.5, columnspacing=1.0)
+            grid[2, j].legend(ncols=3, loc="lower center", fontsize=6, columnspacing=1.0)
             grid[2, j].set_ylim(
                 -0.25 * float(np.max(c.energies["total"])), 1.1 * float(np.max(c.energies["total"]))
             )
             for k in range(c.joints.shape[1]):
-                grid[3, j].plot(c.time, c.joints[:, k], color=JOINTS[k % 8], lw=1.0, label=f"q{k + 1}")
+                look = LINES[JOINT_ROLES[k % len(JOINT_ROLES)]] | {"label": f"q{k + 1}"}
+                grid[3, j].plot(c.time, c.joints[:, k], **look)
             grid[3, j].set_ylabel("joint position [rad]")
-            grid[3, j].legend(ncols=7, loc="lower center", fontsize=6, handlelength=0.8, columnspacing=0.6)
+            grid[3, j].legend(ncols=7, loc="lower center", fontsize=6, handlelength=1.7, columnspacing=0.6)
             _roomy(grid[3, j], below=0.2)
             grid[0, j].set_title(c.title)
             grid[-1, j].set_xlabel("time [s]")
         _finish(figure, grid[0, 0], conditions)
         return figure
-
-
-def save_figure(figure: Figure, stem: Path) -> list[Path]:
-    """Write `stem`.png and `stem`.pdf, and return the paths."""
-    import matplotlib.pyplot as plt
-
-    paths = [stem.with_suffix(suffix) for suffix in (".png", ".pdf")]
-    for path in paths:
-        with whole_file(path) as temporary:
-            figure.savefig(
-                temporary, dpi=DPI, metadata={"CreationDate": None} if path.suffix == ".pdf" else None
-            )
-    plt.close(figure)
-    return paths
 
 
 def _roomy(axes: Axes, below: float = 0.05) -> None:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from passiflex.limits.confirmation import Confirmation
 from passiflex.limits.limit_map import LimitMap
 from passiflex.limits.planes import Plane
-from passiflex.plotting.style import JOINTS, figure_style
+from passiflex.plotting.style import JOINTS, axis_label, figure_style
 from passiflex.simulation.admissible import INERTIA_RATIOS, delay_words
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ def draw_limits(found: LimitMap) -> Figure:
         _over_rate(over_rate, found)
         bar = figure.colorbar(filled, ax=impedance, pad=0.02, aspect=30)
         bar.set_ticks(LEVELS, labels=[f"{v:g}" for v in LEVELS])
-        bar.ax.set_title("spectral\nradius", fontsize=6)
+        bar.ax.set_title(axis_label("spectral\nradius", "1"), fontsize=6)
         unique: dict[str, Artist] = {}
         for axes in grid[0]:
             handles, labels = axes.get_legend_handles_labels()
@@ -81,8 +81,8 @@ def _shaping(axes: Axes, found: LimitMap, plane: Plane, least: Array) -> None:
         axes.plot(*own, **OWN, label="the scenario's gains")
     _confirmed(axes, found, "shaping")
     _logarithmic(axes, plane)
-    axes.set_xlabel("$K_e/K$")
-    axes.set_ylabel("$B_e/B$")
+    axes.set_xlabel(axis_label("$K_e/K$", "1"))
+    axes.set_ylabel(axis_label("$B_e/B$", "1"))
     axes.set_title("shaped stiffness and inertia")
 
 
@@ -98,8 +98,8 @@ def _impedance(axes: Axes, found: LimitMap) -> QuadContourSet:
     axes.plot(1, 1, **OWN, label="the scenario's gains")
     _confirmed(axes, found, "impedance")
     _logarithmic(axes, plane)
-    axes.set_xlabel("$K_x$, multiple of the scenario's")
-    axes.set_ylabel("$D_x$, multiple of the scenario's")
+    axes.set_xlabel(axis_label("$K_x$, multiple of the scenario's", "1"))
+    axes.set_ylabel(axis_label("$D_x$, multiple of the scenario's", "1"))
     axes.set_title("Cartesian stiffness and damping")
     return filled
 
@@ -109,13 +109,13 @@ def _over_rate(axes: Axes, found: LimitMap) -> None:
     if found.least_inertia_by_rate is not None:
         for line, border in _by_delay(found, found.least_inertia_by_rate, INERTIA_RATIOS[0]):
             axes.plot(kilohertz, border, **line)
-        axes.set_ylabel("least stable $B_e/B$ with $K_e = K$")
+        axes.set_ylabel(axis_label("least stable $B_e/B$ with $K_e = K$", "1"))
         axes.set_title("rate and shaped inertia")
     else:
         for i, radius in enumerate(found.radius_by_rate):
             axes.plot(kilohertz, radius, **_line(found, i))
         axes.axhline(1, color="0.4", lw=0.8)
-        axes.set_ylabel("spectral radius per period")
+        axes.set_ylabel(axis_label("spectral radius per period", "1"))
         axes.set_title("rate")
     axes.axvline(found.admissible.rate / 1e3, color="0.4", lw=0.8, ls=":", label="the scenario's rate")
     _confirmed(axes, found, "rate", 1e-3)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from passiflex.plotting.style import LINES, figure_style
+from passiflex.plotting.style import LINES, ROLES, SHADE, figure_style
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-CLAIMED: dict[str, Any] = {"color": "#c800a1", "lw": 1.4, "ls": "-.", "label": "tank level T, as claimed"}
-TRUE: dict[str, Any] = {"color": "#0b3fd1", "lw": 1.2, "label": "T that is really there"}
+CLAIMED: dict[str, Any] = LINES["tank"] | {"label": "tank level T, as claimed"}
+TRUE: dict[str, Any] = LINES["true"]
 LARGE = 30.0
 """Energies beyond this [J] are drawn on a logarithmic scale."""
 
@@ -88,12 +88,12 @@ def _energy(axes: Axes, panel: SampledPanel) -> None:
 def _shade(axes: Axes, panel: SampledPanel) -> None:
     """Mark when the governor held the reference back, and from when on the law had fallen back."""
     for flags, color, label in (
-        (panel.governed, "#e69f00", "reference held back"),
-        (panel.latched, "0.6", "fallen back"),
+        (panel.governed, ROLES["governor"].light, ROLES["governor"].label),
+        (panel.latched, ROLES["fallback"].light, ROLES["fallback"].label),
     ):
         if flags.any():
             axes.fill_between(
-                panel.time, 0, 1, where=flags, color=color, alpha=0.25, lw=0,
+                panel.time, 0, 1, where=flags, color=color, alpha=SHADE, lw=0,
                 transform=axes.get_xaxis_transform(), label=label,
             )  # fmt: skip
 

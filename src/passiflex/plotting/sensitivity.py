@@ -24,9 +24,9 @@ class Sweep(NamedTuple):
 
 LAWS = {"proposed": "o", "baseline": "s"}
 STEP_ROWS = (
-    ("overshoot", "overshoot [-]"),
+    ("overshoot", "overshoot [1]"),
     ("settling_time", "settling time, 2 % [s]"),
-    ("rms_to_msd", "rms to the MSD [-]"),
+    ("rms_to_msd", "rms to the MSD [1]"),
 )
 CIRCLE_ROWS = (
     ("tank_energy_min", "lowest tank level [J]"),

@@ -9,7 +9,7 @@ from passiflex.campaigns.intervals import Share
 from passiflex.campaigns.page import Band, Ecdf
 from passiflex.plotting.campaign import draw_band
 from passiflex.plotting.figures import Curve
-from passiflex.plotting.style import BLUE, JOINTS, LINES, figure_style
+from passiflex.plotting.style import BLUE, JOINTS, LINES, axis_label, figure_style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -56,14 +56,17 @@ def draw_uncertainty(columns: Sequence[UncertainColumn], conditions: str) -> Fig
         high = max((c.band.quantiles[-1].max() for c in columns if c.band is not None), default=1.0)
         grid[0, 0].set_ylim(max(low, -0.04) - 0.005, min(high, 0.15) + 0.005)
         left, right = below.subplots(1, 2)
-        for axes, metric, label in ((left, "overshoot", "overshoot"), (right, "margin", "margin [J]")):
+        for axes, metric, label in (
+            (left, "overshoot", axis_label("overshoot", "1")),
+            (right, "margin", axis_label("margin", "J")),
+        ):
             for j, column in enumerate(columns):
                 ecdf: Ecdf = getattr(column, metric)
                 style = {"color": JOINTS[j], "ls": STYLES[j], "lw": 1.3}
                 axes.step(ecdf.values, ecdf.shares, where="post", label=column.title, **style)
             axes.set_xlabel(label)
             axes.set_ylim(0, 1.02)
-        left.set_ylabel("share of robots at or below")
+        left.set_ylabel(axis_label("share of robots at or below", "1"))
         right.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
         figure.supxlabel(conditions, fontsize=6.5, color="0.35")
         return figure
@@ -90,4 +93,5 @@ def _shares(axes: Axes, shares: Sequence[Share], *, named: bool) -> None:
     axes.set_yticks(range(len(SHOWN)), SHOWN.values() if named else [""] * len(SHOWN))
     axes.set_ylim(len(SHOWN) - 0.5, -0.75)
     axes.set_xlim(0, 1)
-    axes.set_xticks([0, 0.5, 1], ["0", "50", "100 %"])
+    axes.set_xticks([0, 0.5, 1], ["0", "50", "100"])
+    axes.set_xlabel(axis_label("share of the robots", "%"))
