@@ -8,6 +8,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 UV := $(BIN)/uv
 UV_PIN := uv==0.13.9
+WEB_PACKAGES := web/node_modules/.package-lock.json
 
 # Nothing of an environment that happens to be active reaches this one.
 unexport VIRTUAL_ENV CONDA_PREFIX PYTHONHOME PYTHONPATH
@@ -18,7 +19,7 @@ unexport UV_PROJECT_ENVIRONMENT UV_PYTHON UV_SYSTEM_PYTHON
 export UV_SYSTEM_CERTS ?= 1
 
 .DELETE_ON_ERROR:
-.PHONY: help reproduce test test-slow check docs bench lock wheel clean
+.PHONY: help reproduce test test-slow check docs bench browser lock wheel clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/\1|\2/p' Makefile | awk -F'|' '{printf "make %-10s %s\n", $$1, $$2}'
@@ -32,10 +33,12 @@ test: $(VENV)/.dev-stamp ## run the tests, without the slow ones
 test-slow: $(VENV)/.dev-stamp ## run the slow tests only
 	$(BIN)/python -m pytest -m slow $(PYTEST_ARGS) $(ARGS)
 
-check: $(VENV)/.dev-stamp ## lint, formatting and types
+check: $(VENV)/.dev-stamp $(WEB_PACKAGES) ## lint, formatting and types; types and tests of web/
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
+	$(BIN)/python hatch_build.py npm run check
+	$(BIN)/python hatch_build.py npm test
 
 docs: $(VENV)/.dev-stamp ## build the documentation into docs/_build/html; a warning is an error
 	$(BIN)/python -m sphinx -W -b html docs docs/_build/html $(ARGS)
@@ -48,8 +51,26 @@ bench: $(VENV)/.dev-stamp ## run every script in benchmarks/
 wheel: $(VENV)/.run-stamp ## build the wheel into dist/
 	$(UV) build --wheel --no-build-isolation --python $(BIN)/python --out-dir dist
 
+browser: ## install Debian's chromium where there is none: the tests of the report drive it
+	@if [ -n "$$PASSIFLEX_BROWSER" ] || command -v chromium >/dev/null 2>&1; then exit 0; fi; \
+	if ! command -v apt-get >/dev/null 2>&1; then \
+	    echo "make: no chromium here, and no apt-get to install it with." \
+	         "Install Chromium or Chrome and name it: PASSIFLEX_BROWSER=/path/to/it" >&2; \
+	    exit 1; \
+	fi; \
+	root=; \
+	if [ "$$(id -u)" != 0 ]; then \
+	    if ! command -v sudo >/dev/null 2>&1; then \
+	        echo "make: no chromium here, and only root may install it: apt-get install chromium" >&2; exit 1; \
+	    fi; \
+	    root=sudo; \
+	fi; \
+	$$root apt-get -qq update && \
+	$$root env DEBIAN_FRONTEND=noninteractive apt-get -qq install --yes --no-install-recommends chromium
+
 clean: ## remove the environment, the caches and what was built; results/ stays
-	rm -rf $(VENV) dist build docs/_build docs/generated .pytest_cache .ruff_cache .mypy_cache .hypothesis
+	rm -rf $(VENV) dist build docs/_build docs/generated web/node_modules src/passiflex/reports/bundle
+	rm -rf .pytest_cache .ruff_cache .mypy_cache .hypothesis
 	find src tests benchmarks docs -type d -name __pycache__ -prune -exec rm -rf {} +
 
 # --- the environment -------------------------------------------------------------------------------
@@ -73,20 +94,24 @@ index=$${PIP_INDEX_URL:-$$("$$py" -m pip config get global.index-url 2>/dev/null
 if [ -n "$$index" ]; then UV_DEFAULT_INDEX=$${UV_DEFAULT_INDEX:-$$index}; export UV_DEFAULT_INDEX; fi
 endef
 
+# The sources of the report's viewer: a change bundles it anew.
+WEB := hatch_build.py $(shell find web -type d \( -name node_modules -o -name dist \) -prune -o -type f -print)
+
 # Adds what a lock names, by hash, and this package in place. Nothing is removed: the two locks are one
 # resolution, so that either can be added to the other.
 define install
 @$(find_python); $(find_index); \
 echo "installing $(1) into $(VENV)"; \
 $(UV) pip install --quiet --python $(BIN)/python --require-hashes --requirements $(1) && \
-$(UV) pip install --quiet --python $(BIN)/python --no-deps --no-build-isolation --editable .
+$(UV) pip install --quiet --python $(BIN)/python --no-deps --no-build-isolation \
+    --reinstall-package passiflex --editable .
 @touch $@
 endef
 
-$(VENV)/.run-stamp: requirements.lock pyproject.toml | $(UV)
+$(VENV)/.run-stamp: requirements.lock pyproject.toml $(WEB) | $(UV)
 	$(call install,requirements.lock)
 
-$(VENV)/.dev-stamp: requirements-dev.lock pyproject.toml | $(UV)
+$(VENV)/.dev-stamp: requirements-dev.lock pyproject.toml $(WEB) | $(UV)
 	$(call install,requirements-dev.lock)
 
 $(UV):
@@ -99,6 +124,11 @@ $(UV):
 	    { [ -x $(BIN)/python ] || "$$py" -m venv --without-pip $(VENV); } && \
 	    "$$py" -m pip --quiet --disable-pip-version-check --python $(BIN)/python install $(UV_PIN); \
 	fi
+
+# The libraries of web/, for the type checker and the tests there.
+$(WEB_PACKAGES): web/package-lock.json | $(VENV)/.dev-stamp
+	$(BIN)/python hatch_build.py npm ci --loglevel=error
+	@touch $@
 
 # --- the locks -------------------------------------------------------------------------------------
 
