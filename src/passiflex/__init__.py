@@ -6,8 +6,8 @@
     print(pf.audit(run).verdict)
 
 The rooms, in the order in which they may import each other: `robots`, `phs`, `control`, `sampled`, `native`,
-`simulation`, `passivity`, `responses`, `limits`, `pieces`, `campaigns`, `studies`, `cli`; `plotting` draws what
-these produce.
+`simulation`, `passivity`, `responses`, `limits`, `pieces`, `campaigns`; then what looks at their results: `views`,
+`plotting`, `reports`, `exports`; then `studies`, `cli`.
 """
 
 from __future__ import annotations
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from passiflex.simulation import Run as Run
     from passiflex.simulation import Scenario as Scenario
     from passiflex.simulation import load_scenario as load_scenario
+    from passiflex.simulation import salvage as salvage
     from passiflex.simulation import simulate as simulate
     from passiflex.studies import shipped_scenario as shipped_scenario
 
@@ -52,6 +53,7 @@ _ROOMS = {
     "recommend": "limits",
     "replay": "campaigns",
     "run_campaign": "campaigns",
+    "salvage": "simulation",
     "shipped_scenario": "studies",
     "simulate": "simulation",
 }

@@ -57,18 +57,22 @@ def test_the_arm_puts_the_end_effector_where_it_was_recorded(description: str | 
 
 def test_a_description_of_another_arm_is_not_believed() -> None:
     """The recorded positions decide: here the catalogue's arm without the tool, and one of seven joints."""
-    planar = read_description("planar2r").chain
-    assert chain_of(changed(robot_description=planar.to_urdf(), robot="somebody's")) is None
-    seven = read_description("iiwa14").chain
-    assert chain_of(changed(robot_description=seven.to_urdf(), robot="iiwa14")) is None
+    own = chain_of(simulated())
+    assert own is not None
+    for name in ("planar2r", "iiwa14"):
+        other = read_description(name).chain.to_urdf()
+        assert chain_of(changed(robot_description=other, configuration="")) is None
+        believed = chain_of(changed(robot_description=other))  # the configuration has the tool
+        assert believed is not None
+        np.testing.assert_allclose(believed.tip_xyz, own.tip_xyz, atol=1e-15)
 
 
 @pytest.mark.parametrize(
     "attributes",
     [
-        {"robot": "somebody's"},
-        {"robot": "../../etc/robot.yaml"},
-        {"robot": None},
+        {"configuration": "robot: somebody's"},
+        {"configuration": "robot: ../../etc/robot.yaml"},
+        {"configuration": "robot: iiwa14"},
         {"configuration": "tool: {position: here}"},
         {"configuration": "{"},
         {"configuration": "a text"},

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
@@ -97,6 +98,15 @@ def audit(run: Signals) -> Audit:
         remedy=remedy,
         balances=(robot, links, law),
     )
+
+
+def audit_if_possible(run: Signals) -> Audit | None:
+    """Return the audit of a run; None where signals that it needs are missing, or are not finite."""
+    try:
+        result = audit(run)
+    except KeyError:  # how a run says that it has no signal of this name
+        return None
+    return result if math.isfinite(result.margin) else None
 
 
 def available_energy(run: Signals) -> NDArray[np.float64]:

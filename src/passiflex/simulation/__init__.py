@@ -8,6 +8,7 @@ from passiflex.simulation.compiled import compiled_loop as compiled_loop
 from passiflex.simulation.problem import Problem as Problem
 from passiflex.simulation.resolve import resolve as resolve
 from passiflex.simulation.run import Run as Run
+from passiflex.simulation.salvage import salvage as salvage
 from passiflex.simulation.scenario import Scenario as Scenario
 from passiflex.simulation.scenario_file import load_scenario as load_scenario
 from passiflex.simulation.scenario_file import parse_scenario as parse_scenario

@@ -98,6 +98,19 @@ class Run:
             self.data.to_netcdf(temporary, engine="h5netcdf", encoding=compressed)
         return path
 
+    def show(self, out: str | Path | None = None, compare: Sequence[Run] = ()) -> Path:
+        """Write the run as one HTML file that can be looked at and sent, and return its path.
+
+        Without `out` it lies in a temporary folder and is opened in the browser, where there is a screen.
+
+        Parameters
+        ----------
+        compare: Runs to show beside this one.
+        """
+        from passiflex.reports import show
+
+        return show(self, out, compare)
+
     @classmethod
     def load(cls, path: str | Path) -> Run:
         """Read a run.

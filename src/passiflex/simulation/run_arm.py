@@ -1,4 +1,4 @@
-"""The arm of a run: as its file describes it, or for an older file as the catalogue does."""
+"""The arm of a run: as its file describes it, or for an older file as its configuration does."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pydantic import ValidationError
 from scipy.spatial.transform import Rotation
 
 from passiflex.errors import PassiflexError
-from passiflex.robots.catalogue import catalogue, read_description
+from passiflex.robots.catalogue import read_description
 from passiflex.robots.chain import SerialChain
 from passiflex.robots.frames import world_frames
 from passiflex.simulation.run import Run
@@ -25,8 +25,8 @@ NEAR = 1e-6
 def chain_of(run: Run) -> SerialChain | None:
     """Return the arm with its tool, or None where the run does not say which one it was.
 
-    A file with the attribute `robot_description` is asked first. An older one names a robot: that of the
-    catalogue is taken, with the tool of the configuration. An arm of another number of joints, or one whose
+    A file with the attribute `robot_description` is asked first. An older one names a robot in its
+    configuration: that one is taken, with the tool. An arm of another number of joints, or one whose
     end effector is not where the run recorded it, is not the arm of the run.
     """
     for chain in _candidates(run):
@@ -41,20 +41,24 @@ def _candidates(run: Run) -> Iterator[SerialChain]:
     if "<" in text:  # anything else would be read as the path of a file
         with suppress(PassiflexError):  # a damaged description: the catalogue may know the robot
             yield replace(SerialChain.from_urdf(text), name=name or "arm")
-    if name in catalogue():
-        chain, tool = read_description(name).chain, _tool(run)
-        if tool is not None:
-            turn = Rotation.from_rotvec(tool.rotation_vector).as_matrix()
-            tip = chain.tip_xyz + chain.tip_rotation @ np.array(tool.position)
-            yield replace(chain, tip_xyz=tip, tip_rotation=chain.tip_rotation @ turn)
+    settings = _settings(run)
+    if settings is not None:
+        robot, tool = settings
+        try:
+            chain = read_description(robot).chain
+        except PassiflexError:
+            return  # the robot's file is gone
+        turn = Rotation.from_rotvec(tool.rotation_vector).as_matrix()
+        tip = chain.tip_xyz + chain.tip_rotation @ np.array(tool.position)
+        yield replace(chain, tip_xyz=tip, tip_rotation=chain.tip_rotation @ turn)
 
 
-def _tool(run: Run) -> Tool | None:
-    """Return the tool of the run's configuration, None where that cannot be read."""
+def _settings(run: Run) -> tuple[str, Tool] | None:
+    """Return robot and tool of the run's configuration, None where that cannot be read."""
     try:
         configuration = yaml.safe_load(str(run.data.attrs.get("configuration", "")))
-        return Tool.model_validate(configuration.get("tool", {}))
-    except (yaml.YAMLError, ValidationError, AttributeError):
+        return str(configuration["robot"]), Tool.model_validate(configuration.get("tool", {}))
+    except (yaml.YAMLError, ValidationError, AttributeError, KeyError, TypeError):
         return None
 
 
