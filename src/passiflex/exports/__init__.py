@@ -1,0 +1,3 @@
+"""Runs for other programs: tables, Rerun recordings, ROS 2 messages."""
+
+from passiflex.exports.export import export_run as export_run
