@@ -76,11 +76,15 @@ def test_fig_2(tmp_path: Path) -> None:
     assert {p.name for p in paths} == {
         "fig2.png",
         "fig2.pdf",
+        "fig2.html",
         "fig2_proposed.nc",
         "fig2_static_proposed.nc",
         "summary.json",
     }
     check_pictures(tmp_path / "new", "fig2")
+    page = (tmp_path / "new" / "fig2.html").read_text(encoding="utf-8")
+    assert "<title>" in page
+    assert len(page) < 3e6
     assert Run.load(tmp_path / "new" / "fig2_static_proposed.nc").name == "fig2_static"
     assert said == ["fig2: proposed", "fig2_static: proposed", "fig2: drawing and writing"]
     numbers = summary(tmp_path / "new")

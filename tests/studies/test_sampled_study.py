@@ -102,7 +102,9 @@ def test_figure_runs_and_summary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr(sampled, "draw_sampled", draw)
     written = reproduce(["sampled"], tmp_path / "new", said.append)
     paths = [path for group in written.values() for path in group]
-    names = {"sampled.png", "sampled.pdf", "summary.json"} | {f"{name}.nc" for name in CASES}
+    names = {"sampled.png", "sampled.pdf", "summary.json", "fig1_sampled.html", "fig2_sampled.html"} | {
+        f"{name}.nc" for name in CASES
+    }
     assert {p.name for p in paths} == names == {p.name for p in (tmp_path / "new").iterdir()}
     numbers = summary(tmp_path / "new")
     assert set(numbers) == {"source", "external_torque", *CASES}
@@ -141,6 +143,7 @@ def test_figure_runs_and_summary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 @pytest.mark.usefixtures("short")
 def test_other_figures_stay_in_the_summary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sampled, "VARIANTS", {"recommended": sampled.VARIANTS["recommended"]})
+    monkeypatch.setattr(sampled, "PAGES", dict.fromkeys(sampled.TASKS, ("recommended",)))
     monkeypatch.setattr(sampled, "external_torque_table", lambda report: {})
     source = {"version": package_version(), "commit": source_commit()}
     (tmp_path / "summary.json").write_text(json.dumps({"source": source, "fig2": {"verdict": "passive"}}))

@@ -1,4 +1,4 @@
-"""The command line: `passiflex reproduce | simulate | audit | limits | campaign | replay | search | robots`."""
+"""The command line: `passiflex reproduce`, `simulate`, `audit`, `show`, `plot`, `limits`, `campaign` and others."""
 
 from __future__ import annotations
 
@@ -11,7 +11,11 @@ if TYPE_CHECKING:
 
 def application() -> App:
     """Return the command line with all its commands."""
-    from passiflex.cli import campaign_commands, commands  # noqa: F401 - they register their commands
+    from passiflex.cli import (  # noqa: F401 - they register their commands
+        campaign_commands,
+        commands,
+        view_commands,
+    )
     from passiflex.cli.terminal import app
 
     return app

@@ -15,6 +15,8 @@ from passiflex.errors import NameUnknownError
 from passiflex.files import require_writable, whole_file
 from passiflex.passivity import claimed_balance
 from passiflex.plotting.figures import CircleColumn, Curve, StepColumn, draw_circle, draw_steps, save_figure
+from passiflex.reports import write_report
+from passiflex.reports.viewer import read_viewer
 from passiflex.responses.steps import displacement
 from passiflex.robots import FlexibleJointRobot
 from passiflex.simulation import Scenario
@@ -25,6 +27,7 @@ from passiflex.studies.paper import FIGURES, Case, Report, figure_cases
 from passiflex.studies.sampled import reproduce_sampled
 from passiflex.studies.summary import summarise
 from passiflex.studies.uncertainty import reproduce_uncertainty
+from passiflex.views import Viewed
 
 STUDIES = {"sampled": reproduce_sampled, "uncertainty": reproduce_uncertainty}
 """Studies beyond the paper's figures."""
@@ -42,8 +45,8 @@ def reproduce(
     The paper's three if none is given; `sampled` is the study of the sampled world, `uncertainty` that of a
     thousand robots.
 
-    Each figure gives a PNG, a PDF and its runs as netCDF; all give their part of `summary.json`, which
-    keeps what earlier calls wrote about other figures of the same version.
+    Each figure gives a PNG, a PDF, its runs as netCDF and a page to look at one of them; all give their part
+    of `summary.json`, which keeps what earlier calls wrote about other figures of the same version.
 
     Raises
     ------
@@ -54,6 +57,7 @@ def reproduce(
         if name not in (*FIGURES, *STUDIES):
             raise NameUnknownError("figure", name, (*FIGURES, *STUDIES))
     require_writable(folder)
+    read_viewer()  # better missed before the work than after
     written: dict[str, list[Path]] = {}
     summary: dict[str, Any] = {}
     for name in figures or FIGURES:
@@ -65,12 +69,18 @@ def reproduce(
         summary |= {case.name: summarise(case) for case in cases}
         report(f"{name}: drawing and writing")
         drawing = _draw(name, [case for case in cases if not case.name.endswith("noise_free")])
-        written[name] = save_figure(drawing, folder / name)
+        written[name] = [*save_figure(drawing, folder / name), _write_page(name, cases[0], folder)]
         for case in cases:
             for law, run in case.runs.items():
                 written[name].append(run.save(folder / f"{case.name}_{law}.nc"))
     written["summary"] = [_write_summary(folder / "summary.json", summary)]
     return written
+
+
+def _write_page(name: str, case: Case, folder: Path) -> Path:
+    """Write the page on the proposed law's run, with the others beside it."""
+    proposed, *others = (Viewed(run, law.replace("_", " ")) for law, run in case.runs.items())
+    return write_report(proposed.run, folder / f"{name}.html", others)
 
 
 def conditions(scenario: Scenario) -> str:

@@ -15,6 +15,7 @@ from passiflex.files import require_writable
 from passiflex.passivity import Audit, audit, port_tank
 from passiflex.plotting.figures import save_figure
 from passiflex.plotting.sampled import SampledPanel, draw_sampled
+from passiflex.reports import write_report
 from passiflex.responses.metrics import rms
 from passiflex.responses.msd import IdealResponse
 from passiflex.responses.steps import displacement, step_window
@@ -26,6 +27,7 @@ from passiflex.simulation.tank_settings import TankSettings
 from passiflex.studies.external_torque import external_torque_table
 from passiflex.studies.paper import Report, ideals, shipped_scenario
 from passiflex.studies.summary import SETTLED_CIRCLE, plain, response_numbers
+from passiflex.views import Viewed
 
 TASKS = ("fig1", "fig2")
 DRAG = Drag.model_validate({"from": 0.0, "to": 1.0, "viscous": 5.0, "dry": 2.0})
@@ -80,6 +82,9 @@ VARIANTS: dict[str, Variant] = {
     "recommended": Variant("recommended gains,\nport tank", lambda s: s),
     "recommended_drag": Variant("recommended gains,\nport tank, drag", _with_drag),
 }
+
+PAGES = {"fig1": ("recommended", "paper_limited"), "fig2": ("recommended_drag", "recommended")}
+"""What the page of a task shows, and what beside it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,11 +170,17 @@ def reproduce_sampled(folder: Path, report: Report = lambda text: None) -> tuple
     summary: dict[str, Any] = {}
     panels: dict[str, list[SampledPanel]] = {task: [] for task in TASKS}
     for task in TASKS:
+        shown: dict[str, Viewed] = {}
         for case in sampled_cases(task, report):
             summary[case.name] = summarise_sampled(case)
             panels[task].append(_panel(case))
             kept = case.run if case.run.failure else case.run.every(SAVED)
             written.append(kept.save(folder / f"{case.name}.nc"))
+            shown[case.name.removeprefix(f"{task}_sampled_")] = Viewed(
+                case.run, case.variant.title.replace("\n", " ")
+            )
+        first, *others = (shown[key] for key in PAGES[task])
+        written.append(write_report(first.run, folder / f"{task}_sampled.html", others))
     summary["external_torque"] = external_torque_table(report)
     report("sampled: drawing")
     paths = save_figure(draw_sampled(list(panels.values()), CONDITIONS), folder / "sampled")

@@ -11,6 +11,7 @@ import numpy as np
 import pyarrow as pa
 
 from passiflex.campaigns import Campaign, run_campaign
+from passiflex.campaigns.evaluate import run_sample
 from passiflex.campaigns.intervals import Share, share_of
 from passiflex.campaigns.page import Page, ideal_along, page
 from passiflex.campaigns.statistics import Statistics, numbers_of, statistics
@@ -18,6 +19,7 @@ from passiflex.files import require_writable
 from passiflex.pieces.run_pieces import Progress, sparsely
 from passiflex.plotting.figures import Curve, save_figure
 from passiflex.plotting.uncertainty import UncertainColumn, draw_uncertainty
+from passiflex.reports import write_report
 from passiflex.responses.steps import step_window
 from passiflex.simulation import Scenario
 from passiflex.simulation.control_settings import Control
@@ -114,6 +116,8 @@ WAYS: dict[str, Way] = {
     "continuous_workspace": Way("paper's gains,\ncontinuous, workspace", _continuous, everywhere=True),
     "recommended_workspace": Way("recommended gains,\n1 kHz, workspace", _recommended, everywhere=True),
 }
+SHOWN = "recommended"
+"""Of this way, a page shows the worst sample."""
 
 
 def uncertainty_campaign(way: str, samples: int = SAMPLES) -> Campaign:
@@ -154,6 +158,9 @@ def reproduce_uncertainty(
         summary[campaign.name]["at_torque_limit"] = at_limit = _at_torque_limit(rows)
         columns.append(_column(campaign, page(campaign, rows, found), Share(**at_limit)))
         written += sorted(done.glob("*.parquet"))
+        if name == SHOWN and found.worst:
+            worst = run_sample(campaign, found.worst[0].sample)
+            written.append(write_report(worst, folder / "uncertainty.html"))
     report("uncertainty: drawing")
     drawing = draw_uncertainty(columns, CONDITIONS.format(samples=samples))
     return [*save_figure(drawing, folder / "uncertainty"), *written], summary

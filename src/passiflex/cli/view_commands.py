@@ -1,0 +1,124 @@
+"""The commands that look at runs: show, plot, export. They read damaged files too, and say what is wrong."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import cyclopts
+
+from passiflex.cli.terminal import app, console, timed
+from passiflex.simulation.salvage import Salvaged
+
+Compared = Annotated[
+    tuple[Path, ...],
+    cyclopts.Parameter(
+        name="--compare", help="further runs to show beside it", consume_multiple=True, negative=""
+    ),
+]
+
+DRAWN = (".png", ".pdf", ".svg")
+
+
+@app.command
+def show(
+    run: Path,
+    *,
+    compare: Compared = (),
+    out: Annotated[
+        Path | None,
+        cyclopts.Parameter(help="HTML file to write; without it RUN.html, opened if there is a screen"),
+    ] = None,
+) -> int:
+    """Write a run as one HTML file that needs nothing else: the moving arm in 3D beside its signals.
+
+    The first run has the controls; those of --compare stand beside it as ghosts and thin lines.
+    """
+    from passiflex.reports import open_in_browser, write_report
+
+    with timed():
+        target = _target(out or run.with_suffix(".html"), (".html", ".htm"), run, *compare)
+        first, *others = _read(run, *compare)
+        notices = [notice for read in (first, *others) for notice in read.notices]
+        written = write_report(first.run, target, [other.run for other in others], notices)
+        console.print(f"wrote {written}")
+        if out is None and open_in_browser(written):
+            console.print("opened it in the browser")
+    return 0
+
+
+@app.command
+def plot(
+    run: Path,
+    *,
+    kind: Annotated[
+        Literal["energy", "tracking", "torque", "port"], cyclopts.Parameter(help="what to draw over time")
+    ],
+    compare: Compared = (),
+    size: Annotated[
+        Literal["column", "double", "slide"],
+        cyclopts.Parameter(help="one or two columns of a paper, or a slide"),
+    ] = "double",
+    out: Annotated[
+        Path | None, cyclopts.Parameter(help="file that ends in .png, .pdf or .svg; without it RUN_KIND.png")
+    ] = None,
+) -> int:
+    """Draw the energies, the tracking, the torques or the powers at the ports of a run."""
+    from passiflex.plotting.figures import save_as
+    from passiflex.plotting.run import draw_run
+    from passiflex.views import viewed
+
+    with timed():
+        target = _target(out or run.with_name(f"{run.stem}_{kind}.png"), DRAWN, run, *compare)
+        first, *others = viewed([read.run for read in _read(run, *compare)])
+        console.print(f"wrote {save_as(draw_run(kind, first, others, size), target)}")
+    return 0
+
+
+@app.command
+def export(
+    run: Path,
+    *,
+    to: Annotated[
+        Literal["rrd", "mcap", "csv"],
+        cyclopts.Parameter(help="Rerun; ROS 2 messages for Foxglove and PlotJuggler; text"),
+    ],
+    out: Annotated[
+        Path | None, cyclopts.Parameter(help="file to write; without it RUN.rrd, .mcap, .csv")
+    ] = None,
+) -> int:
+    """Write a run for another program: Rerun, Foxglove, PlotJuggler, or anything that reads tables."""
+    from passiflex.exports import export_run
+
+    with timed():
+        target = _target(out or run.with_suffix(f".{to}"), (f".{to}",), run)
+        (read,) = _read(run)
+        console.print(f"wrote {export_run(read.run, target)}")
+    return 0
+
+
+def _read(*paths: Path) -> list[Salvaged]:
+    """Return what can be read of each file, after a line on everything that is wrong with it."""
+    from passiflex.simulation.salvage import salvage
+
+    read = [salvage(path) for path in paths]
+    for path, (_, notices) in zip(paths, read, strict=True):
+        for notice in notices:
+            console.print(f"{path}: {notice}", markup=False)
+    return read
+
+
+def _target(out: Path, endings: tuple[str, ...], *read: Path) -> Path:
+    """Return the file to write, after a look at its name: better before the work than after."""
+    from passiflex.files import OutputError, require_writable
+
+    if out.suffix not in endings or out.is_dir():
+        raise OutputError(
+            "wrong name for the file to write",
+            got=str(out),
+            needs=f"a file name that ends in {' or '.join(endings)}",
+        )
+    if out.resolve() in [path.resolve() for path in read]:
+        raise OutputError("the file to write is one of those that are read", got=str(out))
+    require_writable(out.parent)
+    return out
