@@ -424,7 +424,7 @@ def test_show_writes_among_the_temporary_files(tmp_path: Path, monkeypatch: pyte
     monkeypatch.setattr(report.tempfile, "mkdtemp", lambda prefix: str(tmp_path))
     assert show(changed(continuous(), name="../a run")) == tmp_path / "_a_run.html"
     assert show(continuous(), tmp_path / "there.html") == tmp_path / "there.html"
-    assert opened == [tmp_path / "_a_run.html", tmp_path / "there.html"]
+    assert opened == [tmp_path / "_a_run.html"]
 
 
 def test_the_real_viewer_stands_in_the_page(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -53,15 +53,16 @@ def show(
     others: Sequence[Run | Viewed] = (),
     notices: Sequence[str] = (),
 ) -> Path:
-    """Write the report of a run, open it in a browser where there is a screen, and return its path.
+    """Write the report of a run, and return its path.
 
     Parameters
     ----------
-    out: The file to write; None writes into a new folder among the temporary files.
+    out: The file to write; None writes into a new folder among the temporary files, and opens the page in a
+        browser where there is a screen.
     """
-    if out is None:
-        name = re.sub(r"[^A-Za-z0-9_.-]", "_", run.name)[:100].lstrip(".") or "run"
-        out = Path(tempfile.mkdtemp(prefix="passiflex-")) / f"{name}.html"
-    path = write_report(run, out, others, notices)
+    if out is not None:
+        return write_report(run, out, others, notices)
+    name = re.sub(r"[^A-Za-z0-9_.-]", "_", run.name)[:100].lstrip(".") or "run"
+    path = write_report(run, Path(tempfile.mkdtemp(prefix="passiflex-")) / f"{name}.html", others, notices)
     open_in_browser(path)
     return path
