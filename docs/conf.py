@@ -8,7 +8,7 @@ sys.path[:0] = [str(HERE / "_ext"), str(HERE.parent / "src")]
 
 project = "passiflex"
 author = "the passiflex authors"
-exclude_patterns = ["_build"]
+exclude_patterns = ["_build", "generated"]
 
 extensions = [
     "myst_parser",
@@ -31,7 +31,7 @@ python_maximum_signature_line_length = 100
 html_theme = "furo"
 html_title = "passiflex"
 html_static_path = ["_static"]
-html_css_files = ["equations.css"]
+html_css_files = ["equations.css", "pages.css"]
 html_math_renderer = "mathml"
 html_show_copyright = False
 html_copy_source = False
