@@ -1,4 +1,4 @@
-"""Sampled scenarios of the planar arm, one change away from a plain one: ideal sensors and motors, no delay."""
+"""Scenarios of the planar arm; sampled ones one change away from a plain one: ideal sensors and motors, no delay."""
 
 from __future__ import annotations
 
@@ -30,6 +30,23 @@ duration: 0.6
 output_interval: 0.001
 """
 """At 1 kHz its loop is stable with K_e = K from 0.041 B on without delay, from 0.091 B on with one period."""
+PLANAR = """\
+name: planar
+robot: planar2r
+posture: [0.5, 0.8]
+law:
+  type: impedance
+  task: position
+  gravity: robot
+  shaped_stiffness: {ratio: 2}
+  shaped_inertia: {ratio: 0.5}
+  stiffness: {translation: 60}
+  damping: {translation: 20}
+reference: [{at: 0.1, kind: step, by: [0, 0, 0.05]}]
+duration: 0.5
+output_interval: 0.01
+"""
+"""A step in continuous time, half a second of 51 rows."""
 
 
 def merged(data: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:

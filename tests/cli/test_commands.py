@@ -16,23 +16,7 @@ import passiflex
 from cli.shell import Shell
 from passiflex.passivity import audit
 from passiflex.simulation import Run, parse_scenario, simulate
-
-PLANAR = """\
-name: planar
-robot: planar2r
-posture: [0.5, 0.8]
-law:
-  type: impedance
-  task: position
-  gravity: robot
-  shaped_stiffness: {ratio: 2}
-  shaped_inertia: {ratio: 0.5}
-  stiffness: {translation: 60}
-  damping: {translation: 20}
-reference: [{at: 0.1, kind: step, by: [0, 0, 0.05]}]
-duration: 0.5
-output_interval: 0.01
-"""
+from worlds import PLANAR
 
 WRONG = """\
 name: wrong

@@ -12,23 +12,8 @@ import pytest
 from cli.shell import Shell
 from passiflex.simulation import Run, parse_scenario, simulate
 from reports.pages import VIEWER
+from worlds import PLANAR
 
-PLANAR = """\
-name: planar
-robot: planar2r
-posture: [0.5, 0.8]
-law:
-  type: impedance
-  task: position
-  gravity: robot
-  shaped_stiffness: {ratio: 2}
-  shaped_inertia: {ratio: 0.5}
-  stiffness: {translation: 60}
-  damping: {translation: 20}
-reference: [{at: 0.1, kind: step, by: [0, 0, 0.05]}]
-duration: 0.5
-output_interval: 0.01
-"""
 BEGINNINGS = {".png": b"\x89PNG", ".pdf": b"%PDF", ".svg": b"<?xml"}
 
 
@@ -96,6 +81,14 @@ def test_show_says_what_is_damaged_and_shows_the_rest(shell: Shell, tmp_path: Pa
     notice = "Numbers that are not finite, shown as gaps: tau_m (first at 0.1 s)."
     assert result.out.splitlines()[0] == f"{path}: {notice}"
     assert notice in path.with_suffix(".html").read_text(encoding="utf-8")
+
+
+def test_show_says_which_of_the_compared_runs_is_damaged(shell: Shell, saved: Path, tmp_path: Path) -> None:
+    path = with_gap(tmp_path / "gap.nc")
+    shell("show", path, "--compare", path, saved, "--out", tmp_path / "both.html")
+    header = (tmp_path / "both.html").read_text(encoding="utf-8")
+    notice = "Numbers that are not finite, shown as gaps: tau_m (first at 0.1 s)."
+    assert f'["{notice}","gap.nc: {notice}"' in header.split('"notices":', 1)[1]
 
 
 def test_run_show_writes_the_same_page(shell: Shell, saved: Path, tmp_path: Path) -> None:
@@ -184,6 +177,19 @@ def test_a_name_that_does_not_fit(
     expected = f"wrong name for the file to write; got {target}; needs a file name that ends in {needs}"
     assert result.err == f"passiflex: {expected}\n"
     assert not target.exists()
+
+
+@pytest.mark.parametrize("words", [("show",), ("plot", "--kind", "energy"), ("export", "--to", "csv")])
+def test_a_folder_that_cannot_be_made_is_missed_before_the_run_is_read(
+    shell: Shell, tmp_path: Path, words: tuple[str, ...]
+) -> None:
+    (tmp_path / "taken").write_text("a file")
+    endings = {"show": ".html", "plot": ".png", "export": ".csv"}
+    out = tmp_path / "taken" / f"it{endings[words[0]]}"
+    result = shell(words[0], tmp_path / "none.nc", *words[1:], "--out", out)
+    assert result.status == 2
+    assert "cannot write" in result.err
+    assert "none.nc" not in result.err
 
 
 def test_a_run_is_not_written_over(shell: Shell, tmp_path: Path) -> None:

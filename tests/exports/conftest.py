@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from passiflex.simulation import Run
 from worlds import ran
@@ -11,9 +12,16 @@ from worlds import ran
 
 @pytest.fixture(scope="session")
 def run() -> Run:
-    """Return 0.3 s of the planar arm at 1 kHz, its reference moved and its hand pushed."""
+    """Return 0.3 s of the planar arm at 1 kHz, its reference moved and its hand pushed.
+
+    The reference in force is another one everywhere, so that no export takes the one for the other.
+    """
     force = {"from": 0.15, "to": 0.25, "force": [0, 0, 3]}
-    return ran(duration=0.3, forces=[force])
+    data = ran(duration=0.3, forces=[force]).data.copy(deep=True)
+    data["governed_position"] += 0.01
+    turn = Rotation.from_rotvec([0.1, 0.2, 0.3]).as_matrix()
+    data["governed_rotation"][:] = turn @ data["governed_rotation"].to_numpy()
+    return Run(data)
 
 
 @pytest.fixture(scope="session")

@@ -6,8 +6,9 @@ import csv
 from pathlib import Path
 
 import numpy as np
+import pytest
 
-from passiflex.exports import export_run
+from passiflex.exports import csv_file, export_run
 from passiflex.exports.signals import signals_of
 from passiflex.simulation import Run
 
@@ -21,7 +22,11 @@ def read_back(path: Path) -> dict[str, np.ndarray]:
     return dict(zip(header, np.array([[float(x) for x in row] for row in rows]).T, strict=True))
 
 
-def test_the_table_holds_the_run_bit_for_bit(run: Run, tmp_path: Path) -> None:
+@pytest.mark.parametrize("block", [csv_file.BLOCK, 7, 301])
+def test_the_table_holds_the_run_bit_for_bit(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, block: int
+) -> None:
+    monkeypatch.setattr(csv_file, "BLOCK", block)
     table = read_back(export_run(run, tmp_path / "run.csv"))
     assert next(iter(table)) == "time [s]"
     np.testing.assert_array_equal(table.pop("time [s]"), run.time)
@@ -29,6 +34,14 @@ def test_the_table_holds_the_run_bit_for_bit(run: Run, tmp_path: Path) -> None:
         for k, title in enumerate(signal.titles):
             assert table.pop(title).tobytes() == np.ascontiguousarray(signal.values[:, k]).tobytes()
     assert table == {}
+
+
+def test_a_name_from_elsewhere_is_no_formula(run: Run, tmp_path: Path) -> None:
+    hostile = {"q": "=HYPERLINK(1)", "dq": "@SUM(1)", "theta": "+1", "dtheta": "-1", "tau_m": "a=b"}
+    table = read_back(export_run(Run(run.data.rename(hostile)), tmp_path / "run.csv"))
+    assert "'=HYPERLINK(1)_1 [rad]" in table
+    assert "a=b_1 [N m]" in table
+    assert not [title for title in table if title[0] in "=+-@"]
 
 
 def test_numbers_of_all_kinds_come_back(run: Run, tmp_path: Path) -> None:

@@ -158,7 +158,7 @@ def test_points_are_where_the_run_has_them(run: Run, columns: Columns) -> None:
     np.testing.assert_allclose(strip, run["position"], atol=10 * SINGLE)
 
 
-def test_the_recording_says_what_was_run_and_has_a_blueprint(run: Run, path: Path, columns: Columns) -> None:
+def test_the_recording_says_what_was_run(run: Run, path: Path, columns: Columns) -> None:
     reader = RrdReader(str(path))
     assert [store.application_id for store in (*reader.recordings(), *reader.blueprints())] == [
         "passiflex"
@@ -174,14 +174,27 @@ def test_the_recording_says_what_was_run_and_has_a_blueprint(run: Run, path: Pat
     told = [text for (text,) in columns["/events"]["TextLog:text"]]
     assert any(text.startswith("step 0.05 m") for text in told)
     assert any("force" in text and "until 0.25 s" in text for text in told)
-    origins = [
-        text
-        for chunk in reader.stream(store=reader.blueprints()[0]).to_chunks()
-        for text in str(chunk.to_record_batch().to_pydict()).split("'")
-        if text.startswith("/diagrams/")
-    ]
-    kinds = {text.split("/")[2] for text in origins}
-    assert kinds == set(KINDS)
+
+
+def test_the_blueprint_opens_one_diagram_of_each_kind_and_holds_the_others(run: Run, path: Path) -> None:
+    import rerun as rr
+
+    reader = RrdReader(str(path))
+    origins, opened = {}, []
+    for chunk in reader.stream(store=reader.blueprints()[0]).to_chunks():
+        entity = chunk.to_record_batch().to_pydict()
+        if "ViewBlueprint:space_origin" in entity:
+            ((origins[chunk.entity_path.removeprefix("/")],),) = entity["ViewBlueprint:space_origin"]
+        if "ContainerBlueprint:active_tab" in entity:
+            opened += [tab for (tab,) in entity["ContainerBlueprint:active_tab"]]
+    assert {origins[tab] for tab in opened} == {
+        rr.new_entity_path(["diagrams", *place])
+        for place in (("energy", "energies"), ("port", "powers"), ("tracking", "z"), ("torque", "all joints"))
+    }
+    wanted = [p for kind in KINDS for p in panels(kind, Viewed(run, run.name))]
+    assert sorted(origins.values()) == sorted(
+        ["world", "events", *(rr.new_entity_path(["diagrams", p.kind, p.choice]) for p in wanted)]
+    )
 
 
 def test_two_exports_are_two_recordings(run: Run, path: Path, tmp_path: Path) -> None:

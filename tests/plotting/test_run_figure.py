@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -10,7 +11,7 @@ import pytest
 from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
-from matplotlib.colors import same_color
+from matplotlib.colors import same_color, to_hex
 from matplotlib.figure import Figure
 
 from passiflex.errors import NameUnknownError, RunFileError
@@ -91,6 +92,8 @@ def test_stretches_of_time_are_shaded_where_they_are() -> None:
         found = [(path.get_extents().x0, path.get_extents().x1) for box in boxes for path in box.get_paths()]
         expected = sorted((s.start, s.end) for s in panel.spans)
         np.testing.assert_allclose(sorted(found), expected, rtol=0, atol=1e-12)
+        shown = {to_hex(box.get_facecolor()[0]) for box in boxes}
+        assert shown == {ROLES[span.kind].light for span in panel.spans}
     assert {span.kind for span in panels("energy", ONE)[0].spans} == {"governor", "force"}
 
 
@@ -170,7 +173,7 @@ def test_a_run_without_the_signals_is_refused() -> None:
 def test_a_label_is_shown_as_the_text_that_it_is(label: str, tmp_path: Path) -> None:
     """No mathematics, no formats, nothing that hides it; only the symbols of the package are set as such."""
     figure = draw_run("tracking", Viewed(continuous(), label))
-    written = save_as(figure, tmp_path / "a.svg").read_text()
+    written = re.sub(r"<!--.*?-->", "", save_as(figure, tmp_path / "a.svg").read_text(), flags=re.DOTALL)
     assert label.split("x_d")[0].strip().replace("<", "&lt;").replace(">", "&gt;") in written
 
 

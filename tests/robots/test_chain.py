@@ -1,6 +1,7 @@
 """The reader against Pinocchio, and every message of a document that cannot be used."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import casadi as cs
@@ -146,6 +147,18 @@ def test_end_effector_may_be_any_link_of_the_last_rigid_part():
     assert SerialChain.from_urdf(urdf).tip_xyz[2] == 0.2
     assert SerialChain.from_urdf(urdf, "t").tip_xyz[2] == 0.2
     assert SerialChain.from_urdf(urdf, "lower").tip_xyz[2] == 0.0
+
+
+def test_joint_quantities_have_the_units_of_the_joints():
+    chain = read_description("planar2r").chain
+    turning, sliding = chain.joints[0], chain.joints[1]._replace(kind="prismatic")
+    turns, slides, both = (replace(chain, joints=pair) for pair in
+                           ((turning, turning), (sliding, sliding), (turning, sliding)))  # fmt: skip
+    assert turns.joint_units == ("rad", "rad/s", "N m")
+    assert slides.joint_units == ("m", "m/s", "N")
+    assert both.joint_units == ("rad or m", "rad/s or m/s", "N m or N")
+    assert [both.unit_of(i, "N m or N") for i in (0, 1)] == ["N m", "N"]
+    assert [slides.unit_of(i, "N") for i in (0, 1)] == ["N", "N"]
 
 
 def test_triangle_defects_name_the_joint_and_the_moments():

@@ -107,7 +107,9 @@ def test_a_rail_reaches_over_the_whole_travel_and_no_further_than_its_stops() ->
     (rail,) = (s for s in solids(chain)[1] if s.part == "joint")
     for q in (0.0, 0.1, 0.9):
         assert holds(rail, slide.xyz + q * slide.axis)
-    assert not holds(rail, slide.xyz + 0.99 * slide.axis)
+    radius = 2 * rail.radius  # of the link, so that the carriage does not hang over its ends
+    np.testing.assert_allclose(rail.start, slide.xyz - radius * slide.axis)
+    np.testing.assert_allclose(rail.end, slide.xyz + (0.9 + radius) * slide.axis)
     (carriage, *_) = solids(chain)[2]
     assert carriage.part == "link"
     assert holds(carriage, np.zeros(3))
@@ -141,7 +143,9 @@ def test_the_iiwa_is_an_arm_of_seven_housings_that_turn_by_right_angles_in_turn(
     np.testing.assert_allclose(axes[::2], [[0, 0, 1]] * 4, atol=1e-12)  # along the stretched arm
     np.testing.assert_allclose(axes[1::2], [[0, 1, 0]] * 3, atol=1e-12)  # across it
     assert 0.05 < bodies[0][0].radius / 1.6 < 0.08  # the real one is some 0.14 m thick
-    assert all(s.start[2] >= 0 and s.end[2] >= 0 for s in bodies[0])  # nothing is below the floor
+    for s in bodies[0]:  # nothing is below the floor, no half sphere of a capsule either
+        below = s.radius if s.kind == "capsule" else 0.0
+        assert min(s.start[2], s.end[2]) >= below - CLOSE
 
 
 def test_a_link_with_an_offset_leaves_along_its_own_axis_and_arrives_along_the_next() -> None:
@@ -165,21 +169,25 @@ def test_the_urdf_with_solids_is_the_same_chain(name: str) -> None:
 
 
 @settings(max_examples=30, deadline=None)
-@given(chain=serial_chains())
-def test_the_visuals_are_the_solids(chain: SerialChain) -> None:
+@given(chain=serial_chains(), seed=SEEDS)
+def test_the_visuals_are_the_solids(chain: SerialChain, seed: int) -> None:
     """Read by pinocchio's own code: number, place and direction of cylinders and spheres."""
+    chain = with_gaps_closed(chain, seed)
     root = ET.fromstring(with_solids(chain))
     for i, body in enumerate(solids(chain)):
         link = next(e for e in root.iter("link") if e.get("name") == (f"link_{i}" if i else "base"))
         visuals = link.findall("visual")
-        wanted = [x for s in body for x in ([s] if s.kind != "capsule" else [s, s.start, s.end])]
+        wanted: list[tuple[Solid, np.ndarray | None]] = []
+        for s in body:
+            wanted += [(s, None)] if s.kind != "sphere" else []
+            wanted += [(s, s.start), (s, s.end)][: {"cylinder": 0, "sphere": 1, "capsule": 2}[s.kind]]
         assert len(visuals) == len(wanted)
-        for visual, solid in zip(visuals, wanted, strict=True):
+        for visual, (solid, ball) in zip(visuals, wanted, strict=True):
             origin = visual.find("origin")
             assert origin is not None
             xyz, rpy = (np.array([float(w) for w in origin.get(k, "").split()]) for k in ("xyz", "rpy"))
             cylinder, sphere = (visual.find(f"geometry/{shape}") for shape in ("cylinder", "sphere"))
-            if isinstance(solid, Solid):
+            if ball is None:
                 assert cylinder is not None
                 half = pin.rpy.rpyToMatrix(rpy)[:, 2] * float(cylinder.get("length", "nan")) / 2
                 np.testing.assert_allclose(xyz - half, solid.start, atol=1e-12)
@@ -187,6 +195,11 @@ def test_the_visuals_are_the_solids(chain: SerialChain) -> None:
                 assert float(cylinder.get("radius", "nan")) == solid.radius
             else:
                 assert sphere is not None
-                np.testing.assert_array_equal(xyz, solid)
+                np.testing.assert_array_equal(xyz, ball)
+                assert float(sphere.get("radius", "nan")) == solid.radius
+            colour = visual.find("material/color")
+            assert colour is not None
+            *_, opacity = (float(w) for w in colour.get("rgba", "").split())
+            assert opacity == 1
     names = {e.get("name"): float(e.get("upper", "nan")) for e in root.iter("limit")}
     assert all(value <= UNLIMITED for value in names.values())

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import lru_cache
+from importlib import resources
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,24 +14,9 @@ from passiflex.robots.catalogue import read_description
 from passiflex.robots.frames import world_frames
 from passiflex.simulation import Run, parse_scenario, simulate
 from passiflex.simulation.run_arm import chain_of
+from worlds import PLANAR
 
-SCENARIO = """\
-name: planar
-robot: planar2r
-tool: {position: [0.05, 0, 0.02], rotation_vector: [0, 0.3, 0]}
-posture: [0.5, 0.8]
-law:
-  type: impedance
-  task: position
-  gravity: robot
-  shaped_stiffness: {ratio: 2}
-  shaped_inertia: {ratio: 0.5}
-  stiffness: {translation: 60}
-  damping: {translation: 20}
-reference: [{at: 0.1, kind: step, by: [0, 0, 0.05]}]
-duration: 0.4
-output_interval: 0.01
-"""
+SCENARIO = f"{PLANAR}tool: {{position: [0.05, 0, 0.02], rotation_vector: [0, 0.3, 0]}}\n"
 
 
 @lru_cache
@@ -98,3 +85,22 @@ def test_a_tool_of_a_description_is_kept() -> None:
     again = chain_of(changed(robot_description=replace(chain, name="x").to_urdf()))
     assert again is not None
     np.testing.assert_array_equal(again.tip_xyz, chain.tip_xyz)
+
+
+def test_a_tool_turns_with_the_flange_that_carries_it(tmp_path: Path) -> None:
+    """The robot's own end effector is turned already, and an older file names only robot and tool."""
+    data = Path(str(resources.files("passiflex.robots") / "data"))
+    fixed = '<child link="tool"/>\n    <origin xyz="0.4 0 0" rpy="0 0 0"/>'
+    urdf = (data / "planar2r.urdf").read_text(encoding="utf-8")
+    assert fixed in urdf
+    turned = urdf.replace(fixed, fixed.replace("0 0 0", "0.3 -0.4 0.9"))
+    (tmp_path / "planar2r.urdf").write_text(turned, encoding="utf-8")
+    robot = tmp_path / "turned.yaml"
+    robot.write_text((data / "planar2r.yaml").read_text(encoding="utf-8"), encoding="utf-8")
+    run = simulate(parse_scenario(SCENARIO.replace("robot: planar2r", f"robot: {robot}")))
+    del run.data.attrs["robot_description"]
+    chain = chain_of(run)
+    assert chain is not None
+    frames = world_frames(chain, run["q"])
+    np.testing.assert_allclose(frames.position[:, -1], run["position"], atol=1e-12)
+    np.testing.assert_allclose(frames.rotation[:, -1], run["rotation"], atol=1e-12)

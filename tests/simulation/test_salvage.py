@@ -14,23 +14,7 @@ from passiflex.errors import RunFileError
 from passiflex.simulation import Run, parse_scenario, simulate
 from passiflex.simulation.run_file import FORMAT
 from passiflex.simulation.salvage import salvage
-
-PLANAR = """\
-name: planar
-robot: planar2r
-posture: [0.5, 0.8]
-law:
-  type: impedance
-  task: position
-  gravity: robot
-  shaped_stiffness: {ratio: 2}
-  shaped_inertia: {ratio: 0.5}
-  stiffness: {translation: 60}
-  damping: {translation: 20}
-reference: [{at: 0.2, kind: step, by: [0, 0, 0.05]}]
-duration: 0.5
-output_interval: 0.01
-"""
+from worlds import PLANAR
 
 
 @pytest.fixture(scope="module")
@@ -131,6 +115,18 @@ def test_damaged_bytes_of_one_signal_leave_the_others(run: Run, tmp_path: Path) 
         Run.load(path)
 
 
+@pytest.mark.parametrize("signal", [True, False])
+def test_a_file_that_does_not_say_whether_it_has_a_tank_has_one_if_there_is_its_level(
+    run: Run, tmp_path: Path, signal: bool
+) -> None:
+    def change(data: xr.Dataset) -> xr.Dataset:
+        return without("has_tank")(data if signal else data.drop_vars("tank_energy"))
+
+    read, notices = salvage(changed(run, tmp_path / "run.nc", change))
+    assert notices == ("The file does not say its has_tank.",)
+    assert read.has_tank is signal
+
+
 def refused(path: Path) -> str:
     with pytest.raises(RunFileError) as error:
         salvage(path)
@@ -151,6 +147,8 @@ def test_what_cannot_be_shown(run: Run, tmp_path: Path) -> None:
     assert refused(path) == f"{path} is not a run of this version; got no format; needs {FORMAT!r}"
     changed(run, path, lambda data: data.isel(time=slice(0, 0)))
     assert refused(path) == f"{path} holds nothing that can be shown; got no rows"
+    changed(run, path, lambda data: data.drop_vars("time"))
+    assert refused(path) == f"{path} holds nothing that can be shown; got no readable time"
     changed(run, path, lambda data: data.drop_vars(["q", "position", "tank_energy", "tau_m"]))
     expected = f"{path} holds nothing that can be shown; got none of q, position, tank_energy, tau_m"
     assert refused(path) == expected

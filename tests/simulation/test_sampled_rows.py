@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from passiflex.simulation import resolve
+from passiflex.robots.arm import SerialArm
+from passiflex.simulation import ClosedLoop, resolve
 from passiflex.simulation.compiled import compiled_sampled_loop
+from passiflex.simulation.recorded import sample_parts
 from passiflex.simulation.rows import Rows
+from passiflex.simulation.sampled_loop import SampledLoop
 from worlds import PERIOD, world
 
 NOISE = {"noise": {"torque_variance": 0.25, "hold": PERIOD}}
@@ -130,3 +134,22 @@ def where() -> dict[str, slice]:
     problem = resolve(world())
     assert problem.sampling is not None
     return compiled_sampled_loop(problem.sampling.controller).loop.row.slices
+
+
+def test_a_sampled_run_has_the_units_of_its_joints() -> None:
+    """As a run in continuous time has them: a sliding joint has m, m/s and N."""
+    sampling = resolve(world()).sampling
+    assert sampling is not None
+    law, robot = sampling.controller.law, sampling.controller.law.robot
+    first, *others = robot.arm.chain.joints
+    chain = replace(robot.arm.chain, joints=(first._replace(kind="prismatic"), *others))
+    law = replace(law, robot=replace(robot, arm=SerialArm(chain)))
+    closed = ClosedLoop(law)
+    wanted = {f.name: f.unit for f in closed.state + closed.output_layout}
+    parts = sample_parts(SampledLoop(replace(sampling.controller, law=law)))
+    found = {f.name: f.unit for layout in parts.values() for f in layout}
+    shared = wanted.keys() & found.keys()
+    assert {"q", "theta", "dq", "dtheta", "tau_m", "tau_a", "tau_e", "tau_u", "phi", "dphi"} <= shared
+    assert {name: found[name] for name in shared} == {name: wanted[name] for name in shared}
+    assert found["measured_tau_a"] == found["commanded_torque"] == found["believed_tau_e"] == "N m or N"
+    assert (found["measured_q"], found["measured_dq"]) == ("rad or m", "rad/s or m/s")

@@ -109,6 +109,21 @@ def test_stretches_of_the_governor(flags: list[int], expected: list[tuple[float,
     assert [(s.start, s.end) for s in spans_of(shares(flags))] == [pytest.approx(e) for e in expected]
 
 
+def test_it_is_said_what_was_held_back() -> None:
+    """A share is written for both; a stretch may hold either back, or the one after the other."""
+    reference = np.array([1, 0.5, 1, 1, 1, 1, 1, 0.5, 1, 1.0])
+    stiffness = np.array([1, 1, 1, 1, 0.5, 1, 1, 1, 0.5, 1.0])
+    run = made_up(count=10, reference_share=reference, stiffness_share=stiffness)
+    run = Run(run.data.assign_coords(time=0.1 * np.arange(10)))
+    assert [(round(s.start, 9), s.label) for s in spans_of(run)] == [
+        (0.1, "reference held back"),
+        (0.4, "stiffness held back"),
+        (0.7, "reference and stiffness held back"),
+    ]
+    bare = Run(run.data.drop_vars("reference_share"))
+    assert {s.label for s in spans_of(bare)} == {"stiffness held back"}
+
+
 def test_stretches_that_nearly_touch_are_one() -> None:
     run = shares([0, 1, 0, 1, 0, 0])
     close = Run(run.data.assign_coords(time=0.02 * np.arange(6)))

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from passiflex.errors import NameUnknownError
 from passiflex.simulation import Run
+from passiflex.simulation.run_arm import chain_of
 from passiflex.views import KINDS, Panel, Viewed, panels
 from views.seen import KINDS_OF_RUN, altered, continuous, held_back, made_up, rigid, without
 
@@ -44,6 +47,22 @@ def test_every_diagram_says_what_it_is_of(kind: str, of: str) -> None:
         assert len({curve.role for curve in panel.curves}) == len(panel.curves)
         for curve in panel.curves:
             assert curve.time.shape == curve.values.shape
+
+
+UNITS = {
+    "energy": {"energies": "J", "books": "J"},
+    "port": {"powers": "W", "powers of the law": "W", "energies": "J", "energies of the law": "J"},
+    "tracking": {"x": "m", "y": "m", "z": "m", "distance": "m", "orientation": "rad"},
+    "torque": {"all joints": "1", "joint 1": "N m"},
+}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_diagram_has_the_unit_of_its_numbers(kind: str) -> None:
+    powers = {f"{name}_power": ("time", np.ones(40)) for name in ("reference", "drawn", "spilled")}
+    run = made_up(joints=1)
+    run = Run(run.data.assign(powers))
+    assert {panel.choice: panel.unit for panel in panels(kind, Viewed(run, "it"))} == UNITS[kind]
 
 
 @pytest.mark.parametrize(
@@ -141,6 +160,23 @@ def test_a_joint_that_slides_has_a_force() -> None:
     run.data["torque_limit"].attrs["units"] = "N"
     panel = shown("torque", run)["joint 1"]
     assert (panel.title, panel.unit, panel.levels[0].label) == ("force, joint 1", "N", "limit +1 N")
+    assert [c.label for c in panel.curves] == ["motor force τ_m", "joint force τ_a on the link"]
+
+
+def test_where_some_joints_slide_each_has_its_own_unit() -> None:
+    chain = chain_of(continuous())
+    assert chain is not None
+    arm = replace(chain, joints=(chain.joints[0]._replace(kind="prismatic"), *chain.joints[1:]))
+    run = altered(without(continuous(), "position"), robot_description=arm.to_urdf())
+    run.data["torque_limit"].attrs["units"] = "N m or N"
+    found = shown("torque", run)
+    assert [(found[f"joint {i}"].unit, found[f"joint {i}"].title) for i in (1, 2, 3)] == [
+        ("N", "force, joint 1"),
+        ("N m", "torque, joint 2"),
+        ("N m", "torque, joint 3"),
+    ]
+    unknown = altered(run, robot_description="", configuration="")
+    assert shown("torque", unknown)["joint 1"].unit == "N m or N"
 
 
 def test_a_joint_without_a_limit_has_no_share_of_it() -> None:

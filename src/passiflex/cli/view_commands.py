@@ -39,7 +39,9 @@ def show(
     with timed():
         target = _target(out or run.with_suffix(".html"), (".html", ".htm"), run, *compare)
         first, *others = _read(run, *compare)
-        notices = [notice for read in (first, *others) for notice in read.notices]
+        notices = list(first.notices)
+        for path, other in zip(compare, others, strict=True):
+            notices += [f"{path.name}: {notice}" for notice in other.notices]
         written = write_report(first.run, target, [other.run for other in others], notices)
         console.print(f"wrote {written}")
         if out is None and open_in_browser(written):

@@ -10,7 +10,6 @@ import numpy as np
 import xarray as xr
 
 from passiflex.robots.bodies import Array
-from passiflex.robots.chain import SerialChain
 from passiflex.simulation.run import Run
 from passiflex.simulation.run_arm import chain_of
 
@@ -41,7 +40,7 @@ def signals_of(run: Run) -> Iterator[Signal]:
         columns = tuple("_".join([str(name), *words]) for words in product(*indices))
         unit = str(variable.attrs.get("units", "1"))
         if "joint" in variable.dims:
-            units = tuple(_of_joint(unit, place[0], chain) for place in np.ndindex(*shape))
+            units = tuple(chain.unit_of(i, unit) if chain else unit for i, *_ in np.ndindex(*shape))
         else:
             units = tuple(_of_block(unit, place) for place in np.ndindex(*shape))
         values = np.asarray(numbers, dtype=float).reshape(len(numbers), -1)
@@ -52,14 +51,6 @@ def _indices(data: xr.Dataset, dimension: str, size: int) -> list[str]:
     """Return what tells the entries of a dimension apart: its coordinate, or 1, 2, ..."""
     words = data[dimension].to_numpy() if dimension in data.coords else np.arange(1, size + 1)
     return [str(word) for word in words]
-
-
-def _of_joint(unit: str, joint: int, chain: SerialChain | None) -> str:
-    """Return the unit of one joint: "rad or m" goes by its kind, where the arm is known."""
-    revolute, _, prismatic = unit.partition(" or ")
-    if not prismatic or chain is None:
-        return unit
-    return prismatic if chain.joints[joint].kind == "prismatic" else revolute
 
 
 def _of_block(unit: str, place: tuple[int, ...]) -> str:

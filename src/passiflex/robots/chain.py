@@ -6,11 +6,12 @@ source document stay here.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.spatial.transform import Rotation
 
 from passiflex.errors import NameUnknownError, RobotError
 from passiflex.robots.bodies import (
@@ -93,6 +94,12 @@ class SerialChain:
         tip = poses[_end_effector(end_effector, last, poses, children)]
         return cls(name, tuple(joints), tuple(bodies), tip.xyz, tip.rotation)
 
+    def with_tool(self, position: ArrayLike, rotation_vector: ArrayLike) -> SerialChain:
+        """Return the arm with its end effector moved by `position` [m] and turned [rad], seen from where it was."""
+        turn = Rotation.from_rotvec(np.asarray(rotation_vector, dtype=float)).as_matrix()
+        tip = self.tip_xyz + self.tip_rotation @ np.asarray(position, dtype=float)
+        return replace(self, tip_xyz=tip, tip_rotation=self.tip_rotation @ turn)
+
     def to_urdf(self) -> str:
         """Return a canonical URDF document.
 
@@ -125,12 +132,20 @@ class SerialChain:
         ]
         return "\n".join(out) + "\n"
 
-    def unit(self, revolute: str, prismatic: str) -> str:
-        """Return the unit of a joint quantity: one for all joints, or both for an arm that mixes their kinds."""
+    @property
+    def joint_units(self) -> tuple[str, str, str]:
+        """Return the units of joint position, velocity and torque, as "rad or m" for an arm that mixes their kinds."""
+        turns, slides = ("rad", "rad/s", "N m"), ("m", "m/s", "N")
         kinds = {j.kind for j in self.joints}
-        if kinds == {"revolute"}:
-            return revolute
-        return prismatic if kinds == {"prismatic"} else f"{revolute} or {prismatic}"
+        if len(kinds) == 1:
+            return slides if kinds == {"prismatic"} else turns
+        angle, speed, torque = (f"{a} or {b}" for a, b in zip(turns, slides, strict=True))
+        return angle, speed, torque
+
+    def unit_of(self, joint: int, unit: str) -> str:
+        """Return the unit of one joint, counted from 0, of a quantity with one of the `joint_units`."""
+        turning, _, sliding = unit.partition(" or ")
+        return sliding if sliding and self.joints[joint].kind == "prismatic" else turning
 
     def triangle_defects(self) -> list[str]:
         """Return one line for every body whose principal moments no distribution of mass can have."""

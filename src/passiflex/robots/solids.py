@@ -18,8 +18,6 @@ WRIST = 0.6
 """Radius of the last link, as a share of that at the base."""
 LENGTHLESS = 0.3
 """Length [m] that an arm without any length is drawn for."""
-DETOUR = 1.75
-"""A bent link is at most so many times as long as a straight one."""
 COLOURS = {"link": "0.78 0.80 0.83 1", "joint": "0.24 0.30 0.38 1", "tool": "0.90 0.62 0.00 1"}
 
 
@@ -122,9 +120,11 @@ def _around(
 
 
 def _corners(to: Array, own: Joint | None, axis: Array | None, radius: float) -> list[Array]:
-    """Return the corners of a link from the origin to `to`; only the origin where both coincide."""
-    distance = float(np.linalg.norm(to))
-    if distance <= 0.4 * radius:  # the housing at `to` then holds the origin too
+    """Return the corners of a link from the origin to `to`; only the origin where both coincide.
+
+    Along the one axis, across, and along the other one: at most √3 times as long as straight.
+    """
+    if np.linalg.norm(to) <= 0.4 * radius:  # the housing at `to` then holds the origin too
         return [np.zeros(3)]
     first = own.axis * (own.axis @ to) if own is not None else np.zeros(3)
     second = to - axis * (axis @ (to - first)) if axis is not None else to
@@ -133,8 +133,7 @@ def _corners(to: Array, own: Joint | None, axis: Array | None, radius: float) ->
         if min(np.linalg.norm(corner - path[-1]), np.linalg.norm(corner - to)) > 0.5 * radius:
             path.append(corner)
     path.append(to)
-    bent = np.linalg.norm(np.diff(path, axis=0), axis=1).sum()
-    return path if bent <= DETOUR * distance else [path[0], to]
+    return path
 
 
 def _is_collar(corners: list[Array], axis: Array) -> bool:

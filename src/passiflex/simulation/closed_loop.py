@@ -53,16 +53,10 @@ class ClosedLoop:
     law: AbstractLaw
     tank: EnergyTank = EnergyTank()
 
-    @property
-    def joint_units(self) -> tuple[str, str, str]:
-        """Return the units of joint position, velocity and torque."""
-        chain = self.law.robot.arm.chain
-        return chain.unit("rad", "m"), chain.unit("rad/s", "m/s"), chain.unit("N m", "N")
-
     @cached_property
     def state(self) -> Layout:
         """Return the state."""
-        n, (angle, speed, _) = self.law.robot.n, self.joint_units
+        n, (angle, speed, _) = self.law.robot.n, self.law.robot.arm.chain.joint_units
         return Layout(
             (
                 Field("q", (n,), angle, "link position"),
@@ -77,7 +71,7 @@ class ClosedLoop:
     @cached_property
     def inputs(self) -> Layout:
         """Return what is constant between two events."""
-        n, (_, _, torque) = self.law.robot.n, self.joint_units
+        n, (_, _, torque) = self.law.robot.n, self.law.robot.arm.chain.joint_units
         return MOTION + Layout(
             (
                 Field("F_e", (6,), "N, N m", "wrench on the end effector, world axes"),
@@ -94,7 +88,7 @@ class ClosedLoop:
     @cached_property
     def output_layout(self) -> Layout:
         """Return the recorded signals."""
-        n, (angle, speed, torque) = self.law.robot.n, self.joint_units
+        n, (angle, speed, torque) = self.law.robot.n, self.law.robot.arm.chain.joint_units
         claimed = "claimed by the law"
         return Layout(
             (

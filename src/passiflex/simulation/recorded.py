@@ -19,18 +19,19 @@ WISHED = ("desired_position", "desired_rotation")
 
 def sample_parts(loop: SampledLoop) -> dict[str, Layout]:
     """Return the parts of one sample, in their order, by the names of `LaneLoop.instant`."""
-    n = loop.controller.law.robot.n
+    robot = loop.controller.law.robot
+    n, (angle, speed, torque) = robot.n, robot.arm.chain.joint_units
     state = (
-        Field("q", (n,), "rad", "link position"),
-        Field("theta", (n,), "rad", "motor position"),
-        Field("dq", (n,), "rad/s", "link velocity"),
-        Field("dtheta", (n,), "rad/s", "motor velocity"),
+        Field("q", (n,), angle, "link position"),
+        Field("theta", (n,), angle, "motor position"),
+        Field("dq", (n,), speed, "link velocity"),
+        Field("dtheta", (n,), speed, "motor velocity"),
     )
     return {
         "x": Layout(state),
         "quads": Layout(tuple(f._replace(name=f"{f.name}_energy") for f in PLANT_ENERGIES)),
         "controller": loop.memory,
-        "command": Layout((Field("tau_m", (n,), "N m", "motor torque in force"),)),
+        "command": Layout((Field("tau_m", (n,), torque, "motor torque in force"),)),
         "signals": loop.signals,
         "truth": loop.truth,
         "row": loop.row,

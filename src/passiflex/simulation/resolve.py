@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
-from scipy.spatial.transform import Rotation
 
 from passiflex.control.gravity import AbstractGravity, MotorGravity, RobotGravity, StaticGravity
 from passiflex.control.law import AbstractLaw, ImpedanceLaw
@@ -62,7 +61,8 @@ def resolve(scenario: Scenario, robot: FlexibleJointRobot | None = None) -> Prob
     law = _law(scenario, robot)
     q = _start(scenario, robot)
     described = robot.nominal(STANDARD_GRAVITY if law.gravity.in_model else (0.0, 0.0, 0.0))
-    described |= _tool(scenario, described)
+    arm = robot.arm.chain.with_tool(scenario.tool.position, scenario.tool.rotation_vector)
+    described |= {"tool_position": arm.tip_xyz, "tool_rotation": arm.tip_rotation}
     plant = _scaled(described, "deviations", scenario.deviations, robot)
     model = _scaled(described, "model_errors", scenario.model_errors, robot)
     at_start = posture(robot, q, plant)
@@ -174,13 +174,6 @@ def _refuse_soft(robot: FlexibleJointRobot, q: Array, model: dict[str, Array], K
             needs=f"at most {SLOWEST_CONTRACTION:.0%}, so that its fixed point is found",
             try_="a stiffer shaped_stiffness, or gravity: motor",
         )
-
-
-def _tool(scenario: Scenario, described: dict[str, Array]) -> dict[str, Array]:
-    rotation = described["tool_rotation"]
-    offset = rotation @ np.array(scenario.tool.position)
-    turn = Rotation.from_rotvec(scenario.tool.rotation_vector).as_matrix()
-    return {"tool_position": described["tool_position"] + offset, "tool_rotation": rotation @ turn}
 
 
 def _scaled(

@@ -161,8 +161,7 @@ def assemble(
                 _dims(f), values[f.name], {"units": f.unit, "long_name": f.meaning},
             )  # fmt: skip
     n, robot = problem.law.robot.n, problem.law.robot
-    chain = robot.arm.chain
-    angle, speed, torque = chain.unit("rad", "m"), chain.unit("rad/s", "m/s"), chain.unit("N m", "N")
+    angle, speed, torque = robot.arm.chain.joint_units
     for name, limit, unit in (
         ("torque_limit", robot.torque_limit, torque),
         ("velocity_limit", robot.velocity_limit, speed),

@@ -9,7 +9,6 @@ from dataclasses import replace
 import numpy as np
 import yaml
 from pydantic import ValidationError
-from scipy.spatial.transform import Rotation
 
 from passiflex.errors import PassiflexError
 from passiflex.robots.catalogue import read_description
@@ -48,9 +47,7 @@ def _candidates(run: Run) -> Iterator[SerialChain]:
             chain = read_description(robot).chain
         except PassiflexError:
             return  # the robot's file is gone
-        turn = Rotation.from_rotvec(tool.rotation_vector).as_matrix()
-        tip = chain.tip_xyz + chain.tip_rotation @ np.array(tool.position)
-        yield replace(chain, tip_xyz=tip, tip_rotation=chain.tip_rotation @ turn)
+        yield chain.with_tool(tool.position, tool.rotation_vector)
 
 
 def _settings(run: Run) -> tuple[str, Tool] | None:

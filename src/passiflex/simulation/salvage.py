@@ -56,12 +56,21 @@ def salvage(path: str | Path) -> Salvaged:
         )
     data = _with_attributes(data, notices)
     data = _rows_in_order(data, notices)
-    if not data.sizes.get("time") or not any("time" in data[name].dims for name in SHOWN if name in data):
-        got = "no rows" if not data.sizes.get("time") else f"none of {', '.join(SHOWN)}"
-        raise RunFileError(f"{path} holds nothing that can be shown", got=got)
+    if (lacking := _lacking(data)) is not None:
+        raise RunFileError(f"{path} holds nothing that can be shown", got=lacking)
     _note_gaps(data, notices)
     _note_end(data, notices)
     return Salvaged(Run(data), tuple(notices))
+
+
+def _lacking(data: xr.Dataset) -> str | None:
+    """Return what is not there of the least that can be shown."""
+    if not data.sizes.get("time"):
+        return "no rows"
+    if "time" not in data.variables:
+        return "no readable time"  # the number of a row is none
+    shown = any("time" in data[name].dims for name in SHOWN if name in data)
+    return None if shown else f"none of {', '.join(SHOWN)}"
 
 
 def _readable(path: Path, notices: list[str]) -> xr.Dataset:
@@ -74,11 +83,7 @@ def _readable(path: Path, notices: list[str]) -> xr.Dataset:
                     opened[name].load()
                 except Exception:  # the readers raise many kinds for damaged bytes
                     lost.append(str(name))
-            if "time" in lost:
-                raise RunFileError(f"{path} holds nothing that can be shown", got="unreadable time")
             data = opened.drop_vars(lost).load()
-    except RunFileError:
-        raise
     except Exception as error:
         raise unreadable(path, error) from error
     if lost:

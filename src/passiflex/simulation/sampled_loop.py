@@ -83,20 +83,21 @@ class SampledLoop:
     @cached_property
     def signals(self) -> Layout:
         """Return what `control` says of one period."""
-        n = self.controller.law.robot.n
+        robot = self.controller.law.robot
+        n, (angle, speed, torque) = robot.n, robot.arm.chain.joint_units
         claimed = "claimed by the law"
         return Layout(
             (
-                Field("measured_q", (n,), "rad", "q as the sensors have it"),
-                Field("measured_theta", (n,), "rad", "θ as the sensors have it"),
-                Field("measured_dq", (n,), "rad/s", "q̇ as the sensors have it"),
-                Field("measured_dtheta", (n,), "rad/s", "θ̇ as the sensors have it"),
-                Field("measured_tau_a", (n,), "N m", "τ_a as the sensors have it"),
-                Field("believed_tau_e", (n,), "N m", "τ_e as the law believes it"),
-                Field("commanded_torque", (n,), "N m", "τ_m before the motors' limits"),
-                Field("tau_u", (n,), "N m", "outer-loop torque"),
-                Field("phi", (n,), "rad", "shaped motor coordinate of (11)"),
-                Field("dphi", (n,), "rad/s", "its velocity"),
+                Field("measured_q", (n,), angle, "q as the sensors have it"),
+                Field("measured_theta", (n,), angle, "θ as the sensors have it"),
+                Field("measured_dq", (n,), speed, "q̇ as the sensors have it"),
+                Field("measured_dtheta", (n,), speed, "θ̇ as the sensors have it"),
+                Field("measured_tau_a", (n,), torque, "τ_a as the sensors have it"),
+                Field("believed_tau_e", (n,), torque, "τ_e as the law believes it"),
+                Field("commanded_torque", (n,), torque, "τ_m before the motors' limits"),
+                Field("tau_u", (n,), torque, "outer-loop torque"),
+                Field("phi", (n,), angle, "shaped motor coordinate of (11)"),
+                Field("dphi", (n,), speed, "its velocity"),
                 Field("compensated_energy", (), "J", f"V̂(q) of the law's model, {claimed}"),
                 Field("shaped_kinetic_energy", (), "J", f"½ φ̇ᵀ B_e φ̇, {claimed}"),
                 Field("shaped_spring_energy", (), "J", f"½ (φ−q)ᵀ K_e (φ−q), {claimed}"),
@@ -111,13 +112,14 @@ class SampledLoop:
     @cached_property
     def truth(self) -> Layout:
         """Return what `outputs` says of one instant."""
-        n = self.controller.law.robot.n
+        robot = self.controller.law.robot
+        n, (_, _, torque) = robot.n, robot.arm.chain.joint_units
         return Layout(
             (
                 Field("position", (3,), "m", "end effector"),
                 Field("rotation", (3, 3), "1", "axes of the end effector"),
-                Field("tau_a", (n,), "N m", "torque through the joint, positive on the link"),
-                Field("tau_e", (n,), "N m", "external joint torque"),
+                Field("tau_a", (n,), torque, "torque through the joint, positive on the link"),
+                Field("tau_e", (n,), torque, "external joint torque"),
                 Field("wrench", (6,), "N, N m", "F_e on the end effector, drag included"),
                 Field("link_kinetic_energy", (), "J", "½ q̇ᵀ M q̇"),
                 Field("motor_kinetic_energy", (), "J", "½ θ̇ᵀ B θ̇"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from passiflex.errors import ScenarioError
 from passiflex.simulation.run import Run
@@ -10,6 +11,8 @@ from passiflex.simulation.scenario import Circle, Force, Hold, Move, Scenario, S
 from passiflex.simulation.scenario_file import parse_scenario
 from passiflex.views.panel import Array, Mark, Span
 
+GOVERNED = ("reference", "stiffness")
+"""What the governor may hold back; its share is the signal NAME_share."""
 APART = 0.05
 """Two stretches of the governor that are less than this [s] apart are shown as one."""
 
@@ -72,18 +75,28 @@ def _wrench(force: Force) -> str:
 def _governed(run: Run) -> list[Span]:
     """Return when the reference or the stiffness was held back; each stretch lasts until the row after it."""
     held = np.zeros(run.time.size, dtype=bool)
-    for share in ("reference_share", "stiffness_share"):
-        if share in run.data:
-            held |= run[share] < 1
+    for name in GOVERNED:
+        held |= _held_back(run, name)
     if "governed_time" in run.data:  # also between the rows of a thinned file
         held[1:] |= np.diff(run["governed_time"]) > 0
-    spans: list[Span] = []
+    joined: list[tuple[float, float]] = []
     for start, end in _stretches(run.time, held):
-        if spans and start - spans[-1].end < APART:
-            spans[-1] = spans[-1]._replace(end=end)
+        if joined and start - joined[-1][1] < APART:
+            joined[-1] = (joined[-1][0], end)
         else:
-            spans.append(Span(start, end, "reference held back", "governor"))
-    return spans
+            joined.append((start, end))
+    return [Span(start, end, _what_was_held(run, start, end), "governor") for start, end in joined]
+
+
+def _held_back(run: Run, name: str) -> NDArray[np.bool_]:
+    share = f"{name}_share"
+    return run[share] < 1 if share in run.data else np.zeros(run.time.size, dtype=bool)
+
+
+def _what_was_held(run: Run, start: float, end: float) -> str:
+    inside = (run.time >= start) & (run.time <= end)
+    names = [name for name in GOVERNED if (_held_back(run, name) & inside).any()]
+    return f"{' and '.join(names or GOVERNED[:1])} held back"
 
 
 def _fallback(run: Run) -> list[Span]:

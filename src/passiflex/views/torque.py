@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from passiflex.simulation.run import Run
+from passiflex.simulation.run_arm import chain_of
 from passiflex.views.events import marks_of, spans_of
 from passiflex.views.panel import Array, Curve, Level, Panel
 from passiflex.views.viewed import Viewed, curve, curves, other_role, with_curves
@@ -19,7 +20,7 @@ JOINT_LOOKS = 8
 def torque_panels(viewed: Viewed, others: Sequence[Viewed] = ()) -> tuple[Panel, ...]:
     """Return the motor torques as shares of their limits, and motor and joint torque joint by joint."""
     run = viewed.run
-    spans, marks, limits, unit = spans_of(run), marks_of(run), _limits(run), _unit(run)
+    spans, marks, limits, units = spans_of(run), marks_of(run), _limits(run), _units(run)
     shares = Panel(
         kind="torque",
         choice="all joints",
@@ -36,14 +37,14 @@ def torque_panels(viewed: Viewed, others: Sequence[Viewed] = ()) -> tuple[Panel,
             Panel(
                 kind="torque",
                 choice=f"joint {i + 1}",
-                title=f"{'force' if unit == 'N' else 'torque'}, joint {i + 1}",
+                title=f"{_effort(unit)}, joint {i + 1}",
                 unit=unit,
-                curves=_of_joint(viewed, others, i),
+                curves=_of_joint(viewed, others, i, _effort(unit)),
                 levels=_levels(float(limits[i]) if i < limits.size else math.inf, unit),
                 spans=spans,
                 marks=marks,
             )
-            for i in range(_joints(run))
+            for i, unit in enumerate(units)
         ),
     )
 
@@ -53,13 +54,19 @@ def _joints(run: Run) -> int:
 
 
 def _limits(run: Run) -> Array:
-    return np.abs(run["torque_limit"]) if "torque_limit" in run.data else np.full(_joints(run), np.inf)
+    return run["torque_limit"] if "torque_limit" in run.data else np.full(_joints(run), np.inf)
 
 
-def _unit(run: Run) -> str:
-    """Return the unit of a joint's effort: N m, or N for an arm of sliding joints."""
+def _units(run: Run) -> list[str]:
+    """Return the unit of each joint's effort: N m, or N where it slides."""
     named = next((run.data[name] for name in ("torque_limit", "tau_m", "tau_a") if name in run.data), None)
-    return "N m" if named is None else str(named.attrs.get("units", "N m"))
+    unit = "N m" if named is None else str(named.attrs.get("units", "N m"))
+    chain = chain_of(run) if " or " in unit else None
+    return [chain.unit_of(i, unit) if chain else unit for i in range(_joints(run))]
+
+
+def _effort(unit: str) -> str:
+    return "force" if unit == "N" else "torque"
 
 
 def _share(run: Run, i: int, limit: float) -> Curve | None:
@@ -78,11 +85,11 @@ def _levels(limit: float, unit: str) -> tuple[Level, ...]:
     )
 
 
-def _of_joint(viewed: Viewed, others: Sequence[Viewed], i: int) -> tuple[Curve, ...]:
+def _of_joint(viewed: Viewed, others: Sequence[Viewed], i: int, effort: str) -> tuple[Curve, ...]:
     run = viewed.run
     return curves(
-        curve(run, "motor torque τ_m", "motor", lambda: run["tau_m"][:, i]),
-        curve(run, "joint torque τ_a on the link", "joint", lambda: run["tau_a"][:, i]),
+        curve(run, f"motor {effort} τ_m", "motor", lambda: run["tau_m"][:, i]),
+        curve(run, f"joint {effort} τ_a on the link", "joint", lambda: run["tau_a"][:, i]),
         *(_compared(other, other_role(k), i) for k, other in enumerate(others)),
     )
 
