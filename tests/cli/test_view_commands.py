@@ -78,7 +78,7 @@ def test_show_says_what_is_damaged_and_shows_the_rest(shell: Shell, tmp_path: Pa
     path = with_gap(tmp_path / "gap.nc")
     result = shell("show", path)
     assert result.status == 0
-    notice = "Numbers that are not finite, shown as gaps: tau_m (first at 0.1 s)."
+    notice = "Numbers that are not finite or too large, shown as gaps: tau_m (first at 0.1 s)."
     assert result.out.splitlines()[0] == f"{path}: {notice}"
     assert notice in path.with_suffix(".html").read_text(encoding="utf-8")
 
@@ -87,7 +87,7 @@ def test_show_says_which_of_the_compared_runs_is_damaged(shell: Shell, saved: Pa
     path = with_gap(tmp_path / "gap.nc")
     shell("show", path, "--compare", path, saved, "--out", tmp_path / "both.html")
     header = (tmp_path / "both.html").read_text(encoding="utf-8")
-    notice = "Numbers that are not finite, shown as gaps: tau_m (first at 0.1 s)."
+    notice = "Numbers that are not finite or too large, shown as gaps: tau_m (first at 0.1 s)."
     assert f'["{notice}","gap.nc: {notice}"' in header.split('"notices":', 1)[1]
 
 

@@ -133,6 +133,11 @@ class Report:
         """Return where the curves of a diagram are drawn."""
         return self.rectangle(f'section[aria-label="{kind} over time"] .u-over')
 
+    def shown_times(self) -> tuple[float, float]:
+        """Return the stretch of time that the diagrams show [s]."""
+        start, end = self.page.evaluate("() => window.passiflex.shownTimes()")
+        return start, end
+
     def rectangle(self, selector: str) -> Rectangle:
         """Return where the first such element is."""
         box = self.page.locator(selector).first.bounding_box()

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 
 from passiflex.reports.facts import facts, made_by, shown_configuration
 from reports.pages import baseline, changed, continuous, sampled
@@ -138,3 +139,20 @@ def test_who_made_it() -> None:
 def test_a_robot_file_is_shown_by_its_name(path: str) -> None:
     text = f"name: a\nrobot: {path}\nduration: 1.0\n"
     assert shown_configuration(changed(sampled(), configuration=text)) == text.replace(path, "arm.yaml")
+
+
+@pytest.mark.parametrize("name", ["arm.yaml", "my arm: #1.yaml"])
+def test_a_robot_file_in_quotes_and_over_lines_is_shown_by_its_name(name: str) -> None:
+    said = {"name": "a", "robot": f"/home/me/{'a b ' * 40}#x/{name}", "forces": [{"robot": "/not/this"}]}
+    text = shown_configuration(changed(sampled(), configuration=yaml.safe_dump(said)))
+    assert yaml.safe_load(text) == said | {"robot": name}
+
+
+@pytest.mark.parametrize("text", ["", "- 1\n", "robot: {a: 1}\n", "name: a\n"])
+def test_a_configuration_without_a_robot_file_is_shown_as_it_is(text: str) -> None:
+    assert shown_configuration(changed(sampled(), configuration=text)) == text
+
+
+def test_of_a_configuration_that_is_no_yaml_no_path_is_shown() -> None:
+    text = shown_configuration(changed(sampled(), configuration="robot: '/home/me/arm.yaml\nlaw: [1"))
+    assert text == "robot: 'arm.yaml\nlaw: [1"

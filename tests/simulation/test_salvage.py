@@ -11,6 +11,7 @@ import pytest
 import xarray as xr
 
 from passiflex.errors import RunFileError
+from passiflex.passivity import audit
 from passiflex.simulation import Run, parse_scenario, simulate
 from passiflex.simulation.run_file import FORMAT
 from passiflex.simulation.salvage import salvage
@@ -59,11 +60,15 @@ def test_a_thinned_run_is_not_called_short(run: Run, tmp_path: Path) -> None:
     [
         (
             with_numbers("tau_m", slice(10, 12), np.nan),
-            "Numbers that are not finite, shown as gaps: tau_m (first at 0.1 s).",
+            "Numbers that are not finite or too large, shown as gaps: tau_m (first at 0.1 s).",
         ),
         (
             with_numbers("tank_energy", slice(20, None), np.inf),
-            "Numbers that are not finite, shown as gaps: tank_energy (first at 0.2 s).",
+            "Numbers that are not finite or too large, shown as gaps: tank_energy (first at 0.2 s).",
+        ),
+        (
+            with_numbers("tau_m", slice(10, 12), 1e300),
+            "Numbers that are not finite or too large, shown as gaps: tau_m (first at 0.1 s).",
         ),
         (lambda data: data.isel(time=slice(None, 31)), "The run is cut short: it ends at 0.3 s of 0.5 s."),
         (
@@ -72,11 +77,15 @@ def test_a_thinned_run_is_not_called_short(run: Run, tmp_path: Path) -> None:
         ),
         (without("events"), "The file does not say its events."),
         (
+            lambda data: data.assign_attrs(has_tank=np.array([1, 0]), duration="long", control_period=np.nan),
+            "The file does not say its control_period, duration, has_tank.",
+        ),
+        (
             lambda data: data.assign_attrs(format="passiflex run 0"),
             f"The file is a 'passiflex run 0', not a {FORMAT!r}: shown is what has the same name in both.",
         ),
     ],
-    ids=["gap", "infinite", "short", "failed", "attribute", "version"],
+    ids=["gap", "infinite", "huge", "short", "failed", "attribute", "kind of attribute", "version"],
 )
 def test_damage_is_said_and_the_rest_is_there(
     run: Run, tmp_path: Path, change: Callable[[xr.Dataset], xr.Dataset], notice: str
@@ -86,7 +95,7 @@ def test_damage_is_said_and_the_rest_is_there(
     np.testing.assert_array_equal(read["q"], run["q"][: read.time.size])
 
 
-@pytest.mark.parametrize("number", [np.nan, 0.05, 0.19])
+@pytest.mark.parametrize("number", [np.nan, np.inf, 0.05, 0.19, 1e300])
 def test_rows_end_where_time_goes_wrong(run: Run, tmp_path: Path, number: float) -> None:
     path = changed(
         run,
@@ -127,6 +136,56 @@ def test_a_file_that_does_not_say_whether_it_has_a_tank_has_one_if_there_is_its_
     assert read.has_tank is signal
 
 
+def test_a_run_that_diverged_keeps_its_verdict(run: Run, tmp_path: Path) -> None:
+    given = with_numbers("joint_energy", slice(40, None), 1e200)
+    moving = with_numbers("link_kinetic_energy", slice(40, None), 1e200)
+    path = changed(run, tmp_path / "run.nc", lambda data: moving(given(data)))
+    read, notices = salvage(path)
+    assert notices == ()
+    assert audit(read).verdict == audit(Run.load(path)).verdict == "violated"
+
+
+def replaced(name: str, dims: tuple[str, ...], values: np.ndarray) -> Callable[[xr.Dataset], xr.Dataset]:
+    return lambda data: data.drop_vars(name).assign({name: (dims, values)})
+
+
+@pytest.mark.parametrize(
+    ("change", "lost"),
+    [
+        (replaced("tau_m", ("time",), np.zeros(51)), "tau_m (51,) of float64"),
+        (replaced("tau_m", (), np.array(1.0)), "tau_m () of float64"),
+        (replaced("tau_m", ("row", "joint"), np.zeros((9, 2))), "tau_m (9, 2) of float64"),
+        (replaced("tau_m", ("time", "joint"), np.zeros((51, 2), complex)), "tau_m (51, 2) of complex128"),
+        (replaced("position", ("time", "few"), np.zeros((51, 2))), "position (51, 2) of float64"),
+        (replaced("tank_energy", ("time", "joint"), np.zeros((51, 2))), "tank_energy (51, 2) of float64"),
+        (replaced("external_energy", ("time",), np.full(51, "1 J")), "external_energy (51,) of <U3"),
+        (replaced("torque_limit", (), np.array(1.0)), "torque_limit () of float64"),
+    ],
+)
+def test_a_signal_of_another_shape_or_kind_is_left_out(
+    run: Run, tmp_path: Path, change: Callable[[xr.Dataset], xr.Dataset], lost: str
+) -> None:
+    read, notices = salvage(changed(run, tmp_path / "run.nc", change))
+    assert notices == (f"Left out, as they do not fit a run: {lost}.",)
+    assert lost.split()[0] not in read.data
+    np.testing.assert_array_equal(read["q"], run["q"])
+
+
+def test_space_has_three_axes(run: Run, tmp_path: Path) -> None:
+    path = changed(run, tmp_path / "run.nc", lambda data: data.isel(axis=slice(None, 2)))
+    read, notices = salvage(path)
+    assert "position (51, 2) of float64" in notices[0]
+    assert "position" not in read.data
+
+
+def test_a_signal_on_its_side_is_turned(run: Run, tmp_path: Path) -> None:
+    path = changed(run, tmp_path / "run.nc", lambda data: data.assign(q=data["q"].T, wrench=data["wrench"].T))
+    read, notices = salvage(path)
+    assert notices == ()
+    np.testing.assert_array_equal(read["q"], run["q"])
+    np.testing.assert_array_equal(read["wrench"], run["wrench"])
+
+
 def refused(path: Path) -> str:
     with pytest.raises(RunFileError) as error:
         salvage(path)
@@ -145,6 +204,8 @@ def test_what_cannot_be_shown(run: Run, tmp_path: Path) -> None:
     )
     xr.Dataset({"a": ("x", [1.0])}).to_netcdf(path, engine="h5netcdf")
     assert refused(path) == f"{path} is not a run of this version; got no format; needs {FORMAT!r}"
+    changed(run, path, lambda data: data.assign_coords(time=("time", np.full(51, "noon"))))
+    assert refused(path) == f"{path} holds nothing that can be shown; got time of <U4 (51,)"
     changed(run, path, lambda data: data.isel(time=slice(0, 0)))
     assert refused(path) == f"{path} holds nothing that can be shown; got no rows"
     changed(run, path, lambda data: data.drop_vars("time"))

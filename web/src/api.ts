@@ -1,6 +1,7 @@
 /** What tests and the console of the browser may ask the page: `window.passiflex`. */
 
 import type { Report } from "./data.ts";
+import type { Window } from "./plots/window.ts";
 import type { Header } from "./report.ts";
 import { readAt } from "./sampling.ts";
 import type { SceneView } from "./scene/view.ts";
@@ -16,6 +17,8 @@ export interface Api {
   playing: () => boolean;
   /** Set the speed (1: real time) if one is given; the present one. */
   speed: (x?: number) => number;
+  /** The stretch of time that the diagrams show [s]. */
+  shownTimes: () => number[];
   /** The value of a curve at the play time, in the unit of its panel: the nearest row; null for a gap. */
   value: (kind: string, choice: string, label: string) => number | null;
   /** End effector by the viewer's own kinematics [m]. */
@@ -34,7 +37,7 @@ declare global {
   }
 }
 
-export function makeApi(report: Report, timeline: Timeline, scene: SceneView): Api {
+export function makeApi(report: Report, timeline: Timeline, shown: Window, scene: SceneView): Api {
   return {
     header: report.header,
     time: () => timeline.time,
@@ -46,6 +49,7 @@ export function makeApi(report: Report, timeline: Timeline, scene: SceneView): A
       if (x !== undefined) timeline.setSpeed(x);
       return timeline.speed;
     },
+    shownTimes: () => [...shown.range],
     value: (kind, choice, label) => {
       const panel = report.panels.find((p) => p.kind === kind && p.choice === choice);
       const curve = panel?.curves.find((c) => c.label === label);

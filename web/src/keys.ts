@@ -8,10 +8,11 @@ export const KEYS: [string[], string][] = [
   [["←", "→"], "one frame back or on"],
   [["shift ←", "shift →"], "one second back or on"],
   [["home", "end"], "start or end of the run"],
-  [["w"], "the worst moment"],
+  [["w"], "the worst moment; once more: zoom to it"],
   [["+", "−"], "faster or slower"],
   [["1", "2"], "look at the whole arm, or at the end effector from near by"],
   [["f"], "keep looking at the end effector, or stop that"],
+  [["i", "o"], "zoom the diagrams in at the play time, or out"],
   [["z"], "show all times in the diagrams"],
   [["?"], "this list"],
 ];
@@ -23,6 +24,8 @@ export interface Actions {
   closeUp: () => void;
   follow: () => void;
   allTimes: () => void;
+  /** Zoom by this factor, less than 1 to see a shorter time. */
+  zoom: (factor: number) => void;
 }
 
 /** Controls that need a key for themselves. */
@@ -45,6 +48,8 @@ export function listenToKeys(timeline: Timeline, actions: Actions): void {
     "-": () => timeline.shiftSpeed(-1),
     w: actions.worst,
     f: actions.follow,
+    i: () => actions.zoom(0.5),
+    o: () => actions.zoom(2),
     z: actions.allTimes,
     "1": actions.whole,
     "2": actions.closeUp,

@@ -16,10 +16,25 @@ import { makeTransport } from "./transport.ts";
 /** Largest distance [m] between the drawn tip and the recorded one that round-off explains. */
 const TIP_TOLERANCE = 1e-5;
 
+/** What is seen to each side of the worst moment when one goes there once more [s]; every row of it is on the page. */
+const CLOSE_UP = 0.25;
+
 /** The time [s] a fragment `#t=12.5` names. */
 function fragmentTime(): number {
   const text = new URLSearchParams(location.hash.slice(1)).get("t");
   return text === null || text === "" ? NaN : Number(text);
+}
+
+/** Paper is white: what is drawn for a dark page could not be read on it. */
+function printInLight(theme: Theme): void {
+  let before: typeof theme.tone | null = null;
+  addEventListener("beforeprint", () => {
+    before = theme.tone;
+    theme.set("light");
+  });
+  addEventListener("afterprint", () => {
+    if (before) theme.set(before);
+  });
 }
 
 async function start(): Promise<void> {
@@ -33,6 +48,7 @@ async function start(): Promise<void> {
     const worst = header.verdict?.worst_time ?? null;
     if (worst === null) return;
     timeline.pause();
+    if (timeline.time === worst) plots.window.zoom(worst - CLOSE_UP, worst + CLOSE_UP);
     timeline.seek(worst);
   };
   if (header.arm) {
@@ -54,10 +70,12 @@ async function start(): Promise<void> {
     closeUp: () => scene.closeUp(),
     follow: () => scene.toggleFollow(),
     allTimes: () => plots.window.reset(),
+    zoom: (factor) => plots.window.scale(timeline.time, factor),
   });
+  printInLight(theme);
   timeline.seek(fragmentTime());
   addEventListener("hashchange", () => timeline.seek(fragmentTime()));
-  window.passiflex = makeApi(report, timeline, scene);
+  window.passiflex = makeApi(report, timeline, plots.window, scene);
 }
 
 watchErrors();

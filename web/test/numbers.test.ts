@@ -1,6 +1,6 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { bracketed, clock, fixed, shown, withUnit } from "../src/numbers.ts";
+import { apart, beside, bracketed, clock, fixed, shown, withUnit } from "../src/numbers.ts";
 
 test("numbers have four digits and no noise", () => {
   const cases: [number | null, string][] = [
@@ -27,4 +27,20 @@ test("times and fixed numbers never show a sign before zero", () => {
   assert.equal(fixed(-0.0004, 3), "0.000");
   assert.equal(fixed(-0.0006, 3), "−0.001");
   assert.equal(fixed(NaN, 3), "–");
+});
+
+test("the distance of two times is a period", () => {
+  assert.equal(apart(0.0087), "Δ 8.7 ms, 115 Hz");
+  assert.equal(apart(-2), "Δ 2 s, 0.5 Hz");
+  assert.equal(apart(0), "");
+  assert.equal(apart(NaN), "");
+});
+
+test("numbers that share a scale have the same decimals", () => {
+  assert.equal(beside(-0.00512, 1), "−0.01");
+  assert.equal(beside(0.00512, 0.3), "0.005");
+  assert.equal(beside(-1e-17, 1), "0.00");
+  assert.equal(beside(42.123, 176), "42");
+  assert.equal(beside(2e7, 2e7), "2e7");
+  assert.equal(beside(0, 0), "0");
 });

@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import type { Curve, Panel } from "../src/data.ts";
-import { extent, liveliest, rangeWith } from "../src/plots/ranges.ts";
+import { core, extent, liveliest, rangeWith, spiky } from "../src/plots/ranges.ts";
 import { joined } from "../src/plots/series.ts";
 import { Window } from "../src/plots/window.ts";
 
@@ -47,4 +47,28 @@ test("the window stays inside the run and tells of changes only", () => {
   assert.equal(calls, 1);
   window.reset();
   assert.ok(window.whole);
+});
+
+test("the window is scaled about a time, and stays inside the run", () => {
+  const window = new Window(0, 30);
+  window.scale(10, 0.5);
+  assert.deepEqual(window.range, [2.5, 17.5]);
+  window.scale(3, 0.5);
+  assert.deepEqual(window.range, [0, 7.5]);
+  window.scale(29, 2);
+  assert.deepEqual(window.range, [15, 30]);
+  window.scale(20, 8);
+  assert.ok(window.whole);
+});
+
+test("spikes are left out of the range that is most of the values", () => {
+  const wave = Array.from({ length: 1000 }, (_, i) => Math.sin(i));
+  const spiked = wave.map((value, i) => (i === 500 ? 80 : value));
+  const [low, high] = core([curve("a", spiked).y])!;
+  assert.ok(low > -1.001 && low < -0.9 && high > 0.9 && high < 1.001);
+  assert.deepEqual(core([[1, null, undefined, 3, 9]], 0, 3), [1, 3]);
+  assert.equal(core([[null, NaN]]), null);
+  assert.ok(spiky([curve("a", spiked)]));
+  assert.ok(!spiky([curve("a", wave)]));
+  assert.ok(!spiky([curve("a", [NaN, NaN])]));
 });

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from passiflex.reports.arrays import Arrays
-from passiflex.reports.thinning import Bins
+from passiflex.reports.thinning import CLOSE, Bins
 from passiflex.views import Mark, Panel, Span
 
 Array = NDArray[np.float64]
@@ -19,10 +19,16 @@ NOW = 1e-9
 
 
 class Diagrams:
-    """Turns panels into what a page says of them; `main` are the instants of the run that the page is about."""
+    """Turns panels into what a page says of them.
 
-    def __init__(self, main: Array, arrays: Arrays):
-        self._main, self._arrays = main, arrays
+    Parameters
+    ----------
+    main: Instants [s] of the run that the page is about.
+    moments: Instants [s] near which long series show every row.
+    """
+
+    def __init__(self, main: Array, arrays: Arrays, moments: Sequence[float] = ()):
+        self._main, self._arrays, self._moments = main, arrays, sorted(set(moments))
         self._thinned: dict[int, float] = {}
         self.times: list[dict[str, Any]] = []
 
@@ -52,19 +58,24 @@ class Diagrams:
         if not self._thinned:
             return ""
         width = max(self._thinned)
-        return (
+        interval = self._thinned[width]
+        said = (
             f"each plotted point is the least or the greatest of {width} rows "
-            f"({self._thinned[width]:.4g} ms): no peak is lost"
+            f"({width * interval * 1000:.4g} ms): no peak is lost, but an oscillation may look like a band"
         )
+        if not self._moments:
+            return said
+        moments = " and ".join(dict.fromkeys(f"{moment:.4g} s" for moment in self._moments))
+        return f"{said}; within {CLOSE * interval:.3g} s of {moments} every row is there"
 
     def _series(self, time: Array, values: Array) -> dict[str, Any]:
         """Return index of the times and place of the values; a run that ended early is followed by a gap."""
         count, main = time.size, self._main
         if count <= main.size and np.allclose(time, main[:count], rtol=0, atol=NOW):
             time, values = main, np.append(values, np.full(main.size - count, np.nan))
-        bins = Bins.of(time.size)
+        bins = Bins.of(time.size, [int(row) for row in np.searchsorted(time, self._moments)])
         if bins.width > 1:
-            self._thinned[bins.width] = bins.width * (time[-1] - time[0]) / (time.size - 1) * 1000
+            self._thinned[bins.width] = float(time[-1] - time[0]) / (time.size - 1)
         place = self._arrays.add(bins.times(time), "f64")
         if place not in self.times:
             self.times.append(place)

@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterator, Sequence
 
 import numpy as np
+import yaml
 
 from passiflex.simulation import Run, Scenario
 from passiflex.simulation.law_settings import (
@@ -63,7 +64,17 @@ def made_by(run: Run) -> str:
 def shown_configuration(run: Run) -> str:
     """Return the resolved configuration, with a robot file by its name: where it lies is nobody else's business."""
     text = str(run.data.attrs["configuration"])
-    return re.sub(r"^(robot: ).*[/\\]", r"\1", text, count=1, flags=re.MULTILINE)
+    try:
+        whole = yaml.compose(text, Loader=yaml.SafeLoader)
+    except yaml.YAMLError:
+        return re.sub(r"[^\s'\"]*[/\\]", "", text)  # nobody can say which of it is the path
+    found = [v for k, v in whole.value if k.value == "robot"] if isinstance(whole, yaml.MappingNode) else []
+    if not (found and isinstance(found[0], yaml.ScalarNode)):
+        return text
+    start, end = (mark.index for mark in (found[0].start_mark, found[0].end_mark))
+    name = re.split(r"[/\\]", found[0].value)[-1]
+    same = name == found[0].value
+    return text if same else text[:start] + yaml.safe_dump(name).splitlines()[0] + text[end:]
 
 
 def _robot(run: Run) -> str:

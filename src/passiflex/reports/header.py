@@ -41,14 +41,16 @@ def content(run: Run, others: Sequence[Run | Viewed] = (), notices: Sequence[str
     ghosts = ghosts_header(main, compared, roles_of(main, compared)[1:], chain, arrays)
     said += [f"{g['label']} is shown without its arm: {ANOTHER}." for g in ghosts if _is_armless(g)]
     found = [panel for kind in KINDS for panel in panels(kind, main, compared)]
-    diagrams = Diagrams(run.time, arrays)
+    verdict = None if result is None else verdict_header(run, result)
+    moments = [verdict[key] for key in ("time", "worst_time")] if verdict else []
+    diagrams = Diagrams(run.time, arrays, [moment for moment in moments if moment is not None])
     header = {
         "format": FORMAT,
         "title": run.name,
         "made_by": made_by(run),
         "notices": said,
         "facts": facts(run, scenario_of(run)),
-        "verdict": None if result is None else verdict_header(run, result),
+        "verdict": verdict,
         "metrics": metrics_header(
             [run, *(v.run for v in compared)], [main.label, *(v.label for v in compared)]
         ),

@@ -83,8 +83,13 @@ def _measured(run: Run) -> dict[str, float | str]:
         return {"end_time": float(run.time[-1])}
     scenario = scenario_of(run)
     try:
-        if scenario is not None:
-            return measures(resolve(scenario), step_window(scenario), run)
+        problem = None if scenario is None else resolve(scenario)
+        if (
+            scenario is not None
+            and problem is not None
+            and problem.law.robot.n == run.data.sizes.get("joint")
+        ):
+            return measures(problem, step_window(scenario), run)
     except (PassiflexError, KeyError):  # the robot's file is gone, or a signal is missing
         pass
     return {
@@ -102,7 +107,7 @@ def _measured(run: Run) -> dict[str, float | str]:
 def _unit(name: str, run: Run) -> str:
     signal = OF_JOINTS.get(name)
     unit = run.data[signal].attrs.get("units") if signal in run.data else None
-    unit = str(unit or MEASURES[name].unit)
+    unit = MEASURES[name].unit if unit is None else str(unit)
     return "" if unit == "1" else unit
 
 

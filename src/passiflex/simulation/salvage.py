@@ -11,6 +11,7 @@ import xarray as xr
 from passiflex.errors import RunFileError
 from passiflex.simulation.run import Run
 from passiflex.simulation.run_file import FORMAT, foreign, require_file, unreadable
+from passiflex.simulation.sound import sound_signals
 
 KIND = FORMAT.rsplit(" ", 1)[0]
 DEFAULTS: dict[str, Any] = {
@@ -21,7 +22,9 @@ DEFAULTS: dict[str, Any] = {
     "control_period": 0.0,
     "duration": 0.0,
 }
-"""What stands in for attributes that a run lacks."""
+"""What stands in for attributes that a run lacks, or that are of another kind."""
+LATEST = 10
+"""An instant after so many times the duration of a run is damage."""
 SHOWN = ("q", "position", "tank_energy", "tau_m")
 """Without any of these there is nothing to look at."""
 
@@ -37,7 +40,8 @@ def salvage(path: str | Path) -> Salvaged:
     """Read as much of a run as is there; a run without damage has no notices.
 
     Rows end before the first instant that is no number or does not follow the one before. Signals that
-    cannot be read are left out; numbers that are not finite stay where they are.
+    cannot be read or do not fit a run are left out; numbers that are not finite, or larger than anything
+    of a robot, are NaN.
 
     Raises
     ------
@@ -55,7 +59,8 @@ def salvage(path: str | Path) -> Salvaged:
             f"The file is a {data.attrs['format']!r}, not a {FORMAT!r}: shown is what has the same name in both."
         )
     data = _with_attributes(data, notices)
-    data = _rows_in_order(data, notices)
+    data = _rows_in_order(_with_seconds(path, data), notices)
+    data = sound_signals(data, notices)
     if (lacking := _lacking(data)) is not None:
         raise RunFileError(f"{path} holds nothing that can be shown", got=lacking)
     _note_gaps(data, notices)
@@ -93,17 +98,38 @@ def _readable(path: Path, notices: list[str]) -> xr.Dataset:
 
 def _with_attributes(data: xr.Dataset, notices: list[str]) -> xr.Dataset:
     defaults = DEFAULTS | {"has_tank": int("tank_energy" in data)}
-    absent = {name: value for name, value in defaults.items() if name not in data.attrs}
+    absent = {name: value for name, value in defaults.items() if not _is_like(data.attrs.get(name), value)}
     if absent:
         notices.append(f"The file does not say its {', '.join(absent)}.")
     return data.assign_attrs(absent)
+
+
+def _is_like(value: Any, default: Any) -> bool:
+    """Return whether an attribute can stand in place of a default: text, or a number in [0, ∞)."""
+    if isinstance(default, str):
+        return isinstance(value, str)
+    real = isinstance(value, int | float | np.integer | np.floating)
+    return real and bool(0 <= value < np.inf)
+
+
+def _with_seconds(path: Path, data: xr.Dataset) -> xr.Dataset:
+    """Return the run with its time in double precision."""
+    if "time" not in data.variables:
+        return data
+    time = data["time"]
+    if time.dtype.kind not in "fiu" or time.dims != ("time",):
+        raise RunFileError(
+            f"{path} holds nothing that can be shown", got=f"time of {time.dtype} {time.shape}"
+        )
+    return data.assign_coords(time=time.astype(np.float64))
 
 
 def _rows_in_order(data: xr.Dataset, notices: list[str]) -> xr.Dataset:
     if not data.sizes.get("time") or "time" not in data.variables:
         return data
     time = data["time"].to_numpy()
-    good = np.isfinite(time) & np.append(True, np.diff(time) > 0)
+    latest = LATEST * data.attrs["duration"] or np.inf
+    good = (np.abs(time) < latest) & np.append(True, np.diff(time) > 0)
     if good.all():
         return data
     count = int(np.argmin(good))
@@ -121,7 +147,7 @@ def _note_gaps(data: xr.Dataset, notices: list[str]) -> None:
                 first[str(name)] = float(data["time"][int(np.argmin(finite))])
     if first:
         signals = ", ".join(f"{name} (first at {at:.4g} s)" for name, at in first.items())
-        notices.append(f"Numbers that are not finite, shown as gaps: {signals}.")
+        notices.append(f"Numbers that are not finite or too large, shown as gaps: {signals}.")
 
 
 def _note_end(data: xr.Dataset, notices: list[str]) -> None:

@@ -39,7 +39,7 @@ export function makeHead(report: Report, theme: Theme, goWorst: () => void): Hea
   );
   const said: [string, string][] = header.thinning ? [...header.facts, ["curves", header.thinning]] : header.facts;
   const chips = said.map(([name, value]) => el("div", { class: "chip" }, el("dt", {}, name), el("dd", {}, value)));
-  const sentence = verdict && el("p", { class: "sentence", title: verdict.remedy || verdict.sentence }, verdict.sentence, verdict.remedy && verdict.verdict !== "passive" ? el("span", { class: "remedy" }, ` What helps: ${verdict.remedy}`) : null);
+  const sentence = verdict && el("p", { class: "sentence", title: verdict.remedy || verdict.sentence }, verdict.sentence, verdict.remedy ? el("span", { class: "remedy" }, ` What helps: ${verdict.remedy}`) : null);
   const element = el(
     "header",
     { class: "head" },

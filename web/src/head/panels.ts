@@ -36,7 +36,7 @@ export function factsDialog({ facts, verdict, notices, thinning, made_by, title 
   const list = el("dl", { class: "facts-list" }, ...facts.flatMap(([name, value]) => [el("dt", {}, name), el("dd", {}, value)]));
   const parts: (HTMLElement | null)[] = [
     verdict && el("p", {}, badge(verdict), " ", verdict.sentence),
-    verdict && verdict.remedy && verdict.verdict !== "passive" ? el("p", {}, el("b", {}, "What helps: "), verdict.remedy) : null,
+    verdict?.remedy ? el("p", {}, el("b", {}, "What helps: "), verdict.remedy) : null,
     ...notices.map((notice) => el("p", { class: "notice" }, notice)),
     list,
     thinning ? el("p", { class: "fine" }, `Curves: ${thinning}`) : null,
@@ -49,7 +49,7 @@ export function keysDialog(): HTMLDialogElement {
   const rows = KEYS.map(([keys, does]) => el("tr", {}, el("th", { scope: "row" }, ...keys.map((key) => el("kbd", {}, key))), el("td", {}, does)));
   const hands = [
     "In a diagram: click to go to that time, drag to zoom all diagrams, double click to show all times; drag a finger to move the play time.",
-    "Click a name in a legend to hide its curve. Point at a diagram to read all curves there; else they are read at the play time.",
+    "Click a name in a legend to hide its curve, with shift to see it alone. Point at a diagram to read all curves there; else they are read at the play time. The distance from the play time to the pointer stands beside it: from peak to peak it is a period.",
     "In the scene: drag to orbit, wheel or pinch to zoom, right drag or two fingers to shift.",
   ];
   return dialog("Keys and hands", el("table", { class: "keys" }, el("tbody", {}, ...rows)), ...hands.map((text) => el("p", {}, text)));

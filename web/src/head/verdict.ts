@@ -23,7 +23,7 @@ export function worstWords(verdict: Verdict | null): string | null {
 export function worstButton(verdict: Verdict | null, go: () => void): HTMLElement | null {
   const words = worstWords(verdict);
   if (!words) return null;
-  const made = button("", `${words} (w)`, go, "worst");
+  const made = button("", `${words} (w); once more: zoom to it`, go, "worst");
   made.append(el("span", { class: "long" }, words), el("span", { class: "short" }, "worst moment"));
   return made;
 }

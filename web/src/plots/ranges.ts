@@ -15,6 +15,33 @@ export function extent(curves: Curve[]): [number, number] | null {
   return low <= high ? [low, high] : null;
 }
 
+/** So much of a curve may lie beyond a range without its spikes, at each end. */
+const RARE = 0.01;
+
+/** Least and largest of the values without the rarest at each end of each curve; null where there is none. */
+export function core(columns: ArrayLike<number | null | undefined>[], from = 0, to = Infinity): [number, number] | null {
+  let [low, high] = [Infinity, -Infinity];
+  for (const column of columns) {
+    const values: number[] = [];
+    for (let i = from; i <= Math.min(to, column.length - 1); i++) {
+      const value = column[i];
+      if (value !== null && value !== undefined && !Number.isNaN(value)) values.push(value);
+    }
+    if (values.length === 0) continue;
+    const rising = Float64Array.from(values).sort();
+    const rare = Math.floor(RARE * (rising.length - 1));
+    low = Math.min(low, rising[rare]!);
+    high = Math.max(high, rising[rising.length - 1 - rare]!);
+  }
+  return low <= high ? [low, high] : null;
+}
+
+/** Whether spikes flatten all the rest of some curves: most of the height is needed for few values. */
+export function spiky(curves: Curve[]): boolean {
+  const [all, most] = [extent(curves), core(curves.map((curve) => curve.y))];
+  return all !== null && most !== null && most[1] > most[0] && all[1] - all[0] > 3 * (most[1] - most[0]);
+}
+
 /** Which of several diagrams to show first: the one whose reference moves most, else the first. */
 export function liveliest(panels: Panel[]): number {
   const ways = panels.map((panel) => {

@@ -2,14 +2,14 @@
 
 import uPlot from "uplot";
 import type { Panel } from "../data.ts";
-import { el, say } from "../dom.ts";
-import { bracketed, clock, shown } from "../numbers.ts";
+import { button, el, say } from "../dom.ts";
+import { apart, bracketed, clock, shown } from "../numbers.ts";
 import type { Theme } from "../theme.ts";
 import type { Timeline } from "../timeline.ts";
 import { listen } from "./gestures.ts";
 import { Legend } from "./legend.ts";
 import { drawLevels, drawMarks, drawSpans } from "./overlay.ts";
-import { liveliest, rangeWith } from "./ranges.ts";
+import { core, liveliest, rangeWith, spiky } from "./ranges.ts";
 import { joined } from "./series.ts";
 import type { Window } from "./window.ts";
 
@@ -29,7 +29,9 @@ export class Slot {
   #heading = el("span", { class: "unit" });
   #when = el("span", { class: "when" });
   #playhead = el("div", { class: "playhead" });
-  #pointer = el("div", { class: "pointer" });
+  #distance = el("span", { class: "distance" });
+  #pointer = el("div", { class: "pointer" }, this.#distance);
+  #spikes: HTMLButtonElement;
   #plot: uPlot | null = null;
 
   constructor(kind: string, panels: Panel[], theme: Theme, timeline: Timeline, window: Window, enlarge: HTMLElement) {
@@ -39,7 +41,9 @@ export class Slot {
     this.#theme = theme;
     this.#timeline = timeline;
     this.#window = window;
-    const side = el("div", { class: "side" }, el("div", { class: "slot-head" }, this.#chooser(), enlarge), el("div", { class: "what" }, this.#heading, this.#when), this.#legend.element);
+    this.#spikes = button("⇕", "leave the rarest values (1 % at each end) out of the height of the diagram", () => this.#leaveOut(), "quiet spikes");
+    this.#spikes.setAttribute("aria-pressed", "false");
+    const side = el("div", { class: "side" }, el("div", { class: "slot-head" }, this.#chooser(), this.#spikes, enlarge), el("div", { class: "what" }, this.#heading, this.#when), this.#legend.element);
     this.element = el("section", { class: "slot", "aria-label": `${kind} over time` }, this.#place, side);
     this.#place.append(el("span", { class: "time-label", "aria-hidden": "true" }, "time [s]"));
     new ResizeObserver(() => this.#fit()).observe(this.#place);
@@ -62,8 +66,9 @@ export class Slot {
     const panel = this.#panel;
     const looks = panel.curves.map((curve) => this.#theme.look(curve.role));
     this.#plot?.destroy();
+    this.#spikes.hidden = !spiky(panel.curves);
     say(this.#heading, `${panel.title} ${bracketed(panel.unit)}`);
-    this.#legend.show(panel, looks, this.#hidden, (i) => this.#toggle(i));
+    this.#legend.show(panel, looks, this.#hidden, (i, alone) => this.#toggle(i, alone));
     this.#plot = new uPlot(this.#options(panel), joined(panel.curves), this.#place);
     this.#plot.over.append(this.#playhead, this.#pointer);
     listen(this.#plot, this.#timeline, this.#window);
@@ -71,10 +76,29 @@ export class Slot {
     this.read();
   }
 
-  #toggle(i: number): void {
-    const label = this.#panel.curves[i]!.label;
-    if (!this.#hidden.delete(label)) this.#hidden.add(label);
-    this.#plot?.setSeries(i + 1, { show: !this.#hidden.has(label) });
+  #toggle(i: number, alone: boolean): void {
+    const labels = this.#panel.curves.map((curve) => curve.label);
+    const label = labels[i]!;
+    if (alone) {
+      const others = labels.filter((other) => other !== label);
+      const already = !this.#hidden.has(label) && others.every((other) => this.#hidden.has(other));
+      labels.forEach((one) => this.#hidden.delete(one));
+      if (!already) others.forEach((other) => this.#hidden.add(other));
+    } else if (!this.#hidden.delete(label)) this.#hidden.add(label);
+    this.#plot?.batch(() => labels.forEach((one, k) => this.#plot!.setSeries(k + 1, { show: !this.#hidden.has(one) })));
+  }
+
+  #leaveOut(): void {
+    this.#spikes.setAttribute("aria-pressed", String(this.#spikes.getAttribute("aria-pressed") === "false"));
+    this.zoomed();
+  }
+
+  /** The height of the diagram, for the curves and the times in sight; null where nothing is. */
+  #reach(u: uPlot, low: number | null, high: number | null): [number, number] | null {
+    if (low === null || high === null) return null;
+    if (this.#spikes.hidden || this.#spikes.getAttribute("aria-pressed") === "false") return [low, high];
+    const [from, to] = u.series[0]!.idxs ?? [];
+    return core(u.data.slice(1).filter((_, k) => u.series[k + 1]!.show), from, to) ?? [low, high];
   }
 
   #options(panel: Panel): uPlot.Options {
@@ -103,7 +127,7 @@ export class Slot {
       select: { show: true, left: 0, top: 0, width: 0, height: 0 },
       scales: {
         x: { time: false, range: () => [...this.#window.range] as [number, number] },
-        y: { range: (_u, low, high) => (low === null || high === null ? rangeWith(0, 1, levels) : rangeWith(low, high, levels)) },
+        y: { range: (u, low, high) => rangeWith(...(this.#reach(u, low, high) ?? ([0, 1] as const)), levels) },
       },
       series: [{}, ...panel.curves.map((curve) => this.#series(curve.label, curve.role))],
       axes: [
@@ -168,6 +192,8 @@ export class Slot {
     };
     put(this.#playhead, this.#timeline.time);
     put(this.#pointer, pointer);
+    say(this.#distance, pointer === null ? "" : apart(pointer - this.#timeline.time));
+    this.#pointer.classList.toggle("left", pointer !== null && pointer > (range[0] + range[1]) / 2);
   }
 
   /** Write the values at the pointer, or at the play time where there is none. */

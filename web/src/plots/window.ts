@@ -46,6 +46,13 @@ export class Window {
     this.#zoomed.forEach((listener) => listener());
   }
 
+  /** Show a stretch of so many times the present length, with time t [s] in its middle as far as the run allows. */
+  scale(t: number, factor: number): void {
+    const length = Math.min(factor * (this.#range[1] - this.#range[0]), this.end - this.start);
+    const low = Math.min(Math.max(t - length / 2, this.start), this.end - length);
+    this.zoom(low, low + length);
+  }
+
   /** Show the whole run again. */
   reset(): void {
     this.zoom(this.start, this.end);

@@ -72,8 +72,10 @@ export class World {
     });
     const dialLayer = inner(dials.group, "dials: link q, motor θ", "--dial-motor", true);
     this.#add(dialLayer, () => dials.paint(theme), (moment, factor) => {
-      dials.group.visible = dialLayer.seen && moment.posture !== null;
-      if (moment.posture) dials.move(moment.posture, moment.q, magnified(moment, factor));
+      const angles = magnified(moment, factor);
+      const readable = moment.posture !== null && angles.every(Number.isFinite);
+      dials.group.visible = dialLayer.seen && readable;
+      if (moment.posture && readable) dials.move(moment.posture, moment.q, angles);
     });
     const motorLayer = inner(motor.group, "motor arm, magnified", "--dial-motor", false);
     this.#add(motorLayer, () => motor.tint(theme.css("--dial-motor")), (moment, factor) => {
