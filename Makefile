@@ -19,7 +19,7 @@ unexport UV_PROJECT_ENVIRONMENT UV_PYTHON UV_SYSTEM_PYTHON
 export UV_SYSTEM_CERTS ?= 1
 
 .DELETE_ON_ERROR:
-.PHONY: help reproduce test test-slow check docs bench browser lock wheel clean
+.PHONY: help reproduce test test-slow check docs bench browser extras lock wheel clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/\1|\2/p' Makefile | awk -F'|' '{printf "make %-10s %s\n", $$1, $$2}'
@@ -67,6 +67,8 @@ browser: ## install Debian's chromium where there is none: the tests of the repo
 	fi; \
 	$$root apt-get -qq update && \
 	$$root env DEBIAN_FRONTEND=noninteractive apt-get -qq install --yes --no-install-recommends chromium
+
+extras: $(VENV)/.dev-stamp ## add what the extras need (Rerun, MCAP, Dask, zig) to the environment
 
 clean: ## remove the environment, the caches and what was built; results/ stays
 	rm -rf $(VENV) dist build docs/_build docs/generated web/node_modules src/passiflex/reports/bundle

@@ -120,6 +120,24 @@ def saved(tmp_path: Path, **changes: float | str) -> Path:
     return Run(data.assign_attrs(failure=changes.get("failure", ""))).save(tmp_path / "run.nc")
 
 
+def test_what_the_energies_do_not_show_is_said(shell: Shell, tmp_path: Path) -> None:
+    data = run().data.drop_vars("theta").copy(deep=True)
+    data["q"][20:] = np.nan
+    path = Run(data).save(tmp_path / "gaps.nc")
+    lines = shell("audit", path).out.splitlines()
+    assert lines[0] == f"{path}: The file lacks theta."
+    expected = "Numbers that are not finite or too large, shown as gaps: q (first at 0.2 s)."
+    assert lines[1] == f"{path}: {expected}"
+
+
+def test_a_run_that_is_cut_short_is_no_passive_one(shell: Shell, tmp_path: Path) -> None:
+    path = Run(run().data.isel(time=slice(0, 31))).save(tmp_path / "short.nc")
+    result = shell("audit", path)
+    assert result.status == 2
+    assert "verdict: inconclusive" in result.out
+    assert "remedy: the run ended early: its rows end at 0.3 s of 0.5 s" in result.out
+
+
 def test_a_passive_run_ends_with_0(shell: Shell, tmp_path: Path) -> None:
     path = saved(tmp_path)
     result = shell("audit", path)

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from cli.shell import Shell
+from passiflex.files import OutputError
 from passiflex.simulation import Run, parse_scenario, simulate
 from reports.pages import VIEWER
 from worlds import PLANAR
@@ -100,6 +101,22 @@ def test_run_show_writes_the_same_page(shell: Shell, saved: Path, tmp_path: Path
     assert nowhere.parent != tmp_path
 
 
+def test_run_show_compares_runs_and_files(saved: Path, tmp_path: Path) -> None:
+    out = tmp_path / "both.html"
+    pages = [run().show(out, compare=beside).read_bytes() for beside in (run(), [run()], saved, [str(saved)])]
+    assert len(set(pages)) == 1
+    assert b"planar (2)" in pages[0]
+
+
+def test_run_show_does_not_write_over_a_run(saved: Path) -> None:
+    before = saved.read_bytes()
+    with pytest.raises(OutputError) as error:
+        run().show(saved)
+    expected = f"wrong name for a report; got {saved}; needs a file name that ends in .html or .htm"
+    assert str(error.value) == expected
+    assert saved.read_bytes() == before
+
+
 # plot
 
 
@@ -156,7 +173,7 @@ def test_a_file_that_is_no_run(shell: Shell, tmp_path: Path, words: tuple[str, .
     path.write_text("time,q\n0,1\n")
     result = shell(words[0], path, *words[1:])
     assert result.status == 2
-    assert result.err.startswith(f"passiflex: {path} is not a netCDF-4 file; got ")
+    assert result.err.startswith(f"passiflex: {path} is not a netCDF-4 file; needs ")
     assert [p.name for p in tmp_path.iterdir()] == ["text.nc"]
 
 
@@ -186,10 +203,22 @@ def test_a_folder_that_cannot_be_made_is_missed_before_the_run_is_read(
     (tmp_path / "taken").write_text("a file")
     endings = {"show": ".html", "plot": ".png", "export": ".csv"}
     out = tmp_path / "taken" / f"it{endings[words[0]]}"
-    result = shell(words[0], tmp_path / "none.nc", *words[1:], "--out", out)
+    empty = tmp_path / "none.nc"
+    empty.touch()
+    result = shell(words[0], empty, *words[1:], "--out", out)
     assert result.status == 2
     assert "cannot write" in result.err
     assert "none.nc" not in result.err
+
+
+@pytest.mark.parametrize("words", [("show",), ("plot", "--kind", "energy"), ("export", "--to", "csv")])
+def test_a_folder_in_place_of_a_file(shell: Shell, saved: Path, words: tuple[str, ...]) -> None:
+    assert shell(words[0], ".", *words[1:]).err == "passiflex: . is a folder; needs the file of a run\n"
+    ending = {"show": ".html", "plot": ".png", "export": ".csv"}[words[0]]
+    folder = saved.with_name(f"folder{ending}")
+    folder.mkdir()
+    result = shell(words[0], saved, *words[1:], "--out", folder)
+    assert result.err == f"passiflex: the file to write is a folder; got {folder}\n"
 
 
 def test_a_run_is_not_written_over(shell: Shell, tmp_path: Path) -> None:

@@ -41,7 +41,8 @@ def test_a_missing_package_says_how_to_get_it(
     monkeypatch.setitem(sys.modules, module, None)  # as if it were not installed
     with pytest.raises(MissingExtraError, match=f"needs the package '{package}'") as caught:
         export_run(run, tmp_path / f"run{ending}")
-    assert caught.value.try_ == f"pip install 'passiflex[{ending[1:] if ending == '.mcap' else 'rerun'}]'"
+    extra = {".mcap": "mcap", ".rrd": "rerun"}[ending]
+    assert caught.value.try_ == f"pip install 'passiflex[{extra}]', in a checkout `make extras`"
     assert list(tmp_path.iterdir()) == []
 
 

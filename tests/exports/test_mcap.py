@@ -61,6 +61,18 @@ def test_joints_are_those_of_the_run(run: Run, messages: Messages) -> None:
             np.testing.assert_array_equal([getattr(s, field) for s in states], run[signal])
 
 
+def test_joints_are_called_as_in_the_robots_own_description(run: Run, tmp_path: Path) -> None:
+    data = run.every(100).data.copy()
+    described = (
+        data.attrs["robot_description"].replace('"joint_1"', '"shoulder"').replace('"joint_2"', '"elbow"')
+    )
+    data.attrs["robot_description"] = described
+    found = decoded(export_run(Run(data), tmp_path / "run.mcap"))
+    assert found["/motor_states"][0][1].name == ["shoulder", "elbow"]
+    ((_, text),) = found["/robot_description"]
+    assert [joint.name for joint in SerialChain.from_urdf(text.data).joints] == ["shoulder", "elbow"]
+
+
 def test_every_other_signal_has_a_topic_with_its_numbers(run: Run, messages: Messages) -> None:
     elsewhere = {"q", "dq", "tau_a", "theta", "dtheta", "tau_m", "wrench"}
     elsewhere |= {

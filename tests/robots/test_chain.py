@@ -121,6 +121,16 @@ def test_source_names_stay_behind():
     assert not re.search("two|upper|lower|shoulder|elbow", re.sub(r' (lower|upper)="', "", urdf))
 
 
+def test_own_names_are_kept_where_asked_for():
+    """Names with marks of XML too; and a joint may be called as the one to the tip usually is."""
+    odd = TWO.replace('"shoulder"', '"a &lt;b&gt; &quot;c&quot;"').replace('"elbow"', '"tip_joint"')
+    chain = SerialChain.from_urdf(odd)
+    again = SerialChain.from_urdf(chain.to_urdf(own_names=True))
+    assert again.name == "two"
+    assert [j.name for j in again.joints] == ['a <b> "c"', "tip_joint"]
+    assert again.to_urdf() == chain.to_urdf()
+
+
 def test_continuous_is_revolute_without_limits():
     chain = SerialChain.from_urdf(TWO.replace("revolute", "continuous"))
     assert chain.joints[0].kind == "revolute"

@@ -216,17 +216,37 @@ def test_files_that_are_no_netcdf(tmp_path: Path) -> None:
         path = tmp_path / name
         path.write_bytes(content)
         expected = (
-            "is not a netCDF-4 file; got "
+            "is not a netCDF-4 file; needs "
             if name in foreign
             else f"is a netCDF file that is cut short or damaged; got {len(content)} bytes, "
         )
         assert refused(path).startswith(f"{path} {expected}")
 
 
-@pytest.mark.parametrize("name", ["none.nc", ".", "none/run.nc"])
+@pytest.mark.parametrize("name", ["none.nc", "none/run.nc"])
 def test_no_file(tmp_path: Path, name: str) -> None:
     path = tmp_path / name
     assert refused(path) == f"no such file: {path}; try passiflex simulate SCENARIO.yaml --out RUN.nc"
+
+
+def test_a_folder(tmp_path: Path) -> None:
+    assert refused(tmp_path) == f"{tmp_path} is a folder; needs the file of a run"
+
+
+def test_a_scenario_is_not_yet_a_run(tmp_path: Path) -> None:
+    path = tmp_path / "planar.yaml"
+    path.write_text(PLANAR)
+    expected = f"needs a file that passiflex simulate wrote; try passiflex simulate {path} --out RUN.nc"
+    assert refused(path) == f"{path} is not a netCDF-4 file; {expected}"
+
+
+def test_a_run_whose_rows_end_early_has_failed() -> None:
+    """Whoever cut it: an audit of the rest is no verdict on the run."""
+    run = planar_run()
+    assert Run(run.data.isel(time=slice(0, 50))).failure == "its rows end at 0.49 s of 1 s"
+    assert Run(run.data.isel(time=slice(0, 1))).failure == "its rows end at 0 s of 1 s"
+    assert audit(Run(run.data.isel(time=slice(0, 50)))).verdict == "inconclusive"
+    assert run.every(7).failure == ""
 
 
 def test_a_netcdf_of_someone_else(tmp_path: Path) -> None:

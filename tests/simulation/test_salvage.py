@@ -70,7 +70,10 @@ def test_a_thinned_run_is_not_called_short(run: Run, tmp_path: Path) -> None:
             with_numbers("tau_m", slice(10, 12), 1e300),
             "Numbers that are not finite or too large, shown as gaps: tau_m (first at 0.1 s).",
         ),
-        (lambda data: data.isel(time=slice(None, 31)), "The run is cut short: it ends at 0.3 s of 0.5 s."),
+        (
+            lambda data: data.isel(time=slice(None, 31)),
+            "The run is cut short: its rows end at 0.3 s of 0.5 s.",
+        ),
         (
             lambda data: data.isel(time=slice(None, 31)).assign_attrs(failure="the motors stopped"),
             "The run ended early, at 0.3 s of 0.5 s: the motors stopped.",
@@ -132,8 +135,16 @@ def test_a_file_that_does_not_say_whether_it_has_a_tank_has_one_if_there_is_its_
         return without("has_tank")(data if signal else data.drop_vars("tank_energy"))
 
     read, notices = salvage(changed(run, tmp_path / "run.nc", change))
-    assert notices == ("The file does not say its has_tank.",)
+    lacks = () if signal else ("The file lacks tank_energy.",)
+    assert notices == ("The file does not say its has_tank.", *lacks)
     assert read.has_tank is signal
+
+
+def test_signals_that_are_missing_are_named(run: Run, tmp_path: Path) -> None:
+    names = ["joint_energy", "theta", "position", "tau_m", "torque_limit", "valve"]
+    _, notices = salvage(changed(run, tmp_path / "run.nc", lambda data: data.drop_vars(names)))
+    # Of valve, nothing is judged, and nobody looks at it.
+    assert notices == ("The file lacks joint_energy, theta, position, tau_m, torque_limit.",)
 
 
 def test_a_run_that_diverged_keeps_its_verdict(run: Run, tmp_path: Path) -> None:
@@ -196,7 +207,7 @@ def test_what_cannot_be_shown(run: Run, tmp_path: Path) -> None:
     path = tmp_path / "run.nc"
     assert refused(path) == f"no such file: {path}; try passiflex simulate SCENARIO.yaml --out RUN.nc"
     path.write_text("time,q\n0,1\n")
-    assert refused(path).startswith(f"{path} is not a netCDF-4 file; got ")
+    assert refused(path).startswith(f"{path} is not a netCDF-4 file; needs ")
     whole = run.save(path).read_bytes()
     path.write_bytes(whole[:-100])
     assert refused(path).startswith(

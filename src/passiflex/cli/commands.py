@@ -78,8 +78,11 @@ def audit(run: Path) -> int:
     """Audit a run: exit status 0 passive, 1 violated, 2 inconclusive or not usable."""
     from passiflex.passivity import audit as audit_run
     from passiflex.simulation.run import Run
+    from passiflex.simulation.run_file import remarks
 
     read = Run.load(run)
+    for remark in remarks(read.data):
+        console.print(f"{run}: {remark}", markup=False)
     result = audit_run(read)
     table = Table(
         "balance", "change of stored energy", "supplied", "dissipated", "largest residual", title=str(run)

@@ -37,7 +37,7 @@ def show(
     from passiflex.reports import open_in_browser, write_report
 
     with timed():
-        target = _target(out or run.with_suffix(".html"), (".html", ".htm"), run, *compare)
+        target = _target(out, ".html", (".html", ".htm"), run, *compare)
         first, *others = _read(run, *compare)
         notices = list(first.notices)
         for path, other in zip(compare, others, strict=True):
@@ -71,7 +71,7 @@ def plot(
     from passiflex.views import viewed
 
     with timed():
-        target = _target(out or run.with_name(f"{run.stem}_{kind}.png"), DRAWN, run, *compare)
+        target = _target(out, f"_{kind}.png", DRAWN, run, *compare)
         first, *others = viewed([read.run for read in _read(run, *compare)])
         console.print(f"wrote {save_as(draw_run(kind, first, others, size), target)}")
     return 0
@@ -93,7 +93,7 @@ def export(
     from passiflex.exports import export_run
 
     with timed():
-        target = _target(out or run.with_suffix(f".{to}"), (f".{to}",), run)
+        target = _target(out, f".{to}", (f".{to}",), run)
         (read,) = _read(run)
         console.print(f"wrote {export_run(read.run, target)}")
     return 0
@@ -110,17 +110,23 @@ def _read(*paths: Path) -> list[Salvaged]:
     return read
 
 
-def _target(out: Path, endings: tuple[str, ...], *read: Path) -> Path:
-    """Return the file to write, after a look at its name: better before the work than after."""
+def _target(out: Path | None, usual: str, endings: tuple[str, ...], run: Path, *others: Path) -> Path:
+    """Return the file to write, by default the run's name with the `usual` end: refused before the work, not after."""
     from passiflex.files import OutputError, require_writable
+    from passiflex.simulation.run_file import require_file
 
-    if out.suffix not in endings or out.is_dir():
+    require_file(run)
+    if out is None:
+        out = run.with_name(run.stem + usual)
+    if out.is_dir():
+        raise OutputError("the file to write is a folder", got=str(out))
+    if out.suffix not in endings:
         raise OutputError(
             "wrong name for the file to write",
             got=str(out),
             needs=f"a file name that ends in {' or '.join(endings)}",
         )
-    if out.resolve() in [path.resolve() for path in read]:
+    if out.resolve() in [path.resolve() for path in (run, *others)]:
         raise OutputError("the file to write is one of those that are read", got=str(out))
     require_writable(out.parent)
     return out

@@ -24,4 +24,6 @@ def imported(module: str, extra: str, purpose: str) -> Any:
         return import_module(module)
     except ImportError as error:
         what = f"{purpose} needs the package {module.partition('.')[0]!r}, which cannot be imported"
-        raise MissingExtraError(what, got=error, try_=f"pip install 'passiflex[{extra}]'") from error
+        raise MissingExtraError(
+            what, got=error, try_=f"pip install 'passiflex[{extra}]', in a checkout `make extras`"
+        ) from error

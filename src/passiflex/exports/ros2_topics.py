@@ -48,7 +48,9 @@ def topics_of(chain: SerialChain | None, signals: Sequence[Signal], time: Sequen
         if parts[0] in known:
             taken.update(parts)
             units = {f: known[p].units for f, p in zip(FIELDS, parts, strict=True) if p in known}
-            yield Topic(name, "sensor_msgs/JointState", units, _joint_states(known, parts, headers))
+            joints = [joint.name for joint in chain.joints] if chain is not None else []
+            states = _joint_states(known, parts, headers, joints)
+            yield Topic(name, "sensor_msgs/JointState", units, states)
     for name, (position, rotation) in POSES.items():
         if position in known and rotation in known:
             taken.update((position, rotation))
@@ -114,11 +116,15 @@ def _transforms(
 
 
 def _joint_states(
-    known: Mapping[str, Signal], parts: Sequence[str], headers: Sequence[Message]
+    known: Mapping[str, Signal], parts: Sequence[str], headers: Sequence[Message], joints: Sequence[str]
 ) -> Callable[[int], Message]:
-    """Return position, velocity and effort by joint; what the run lacks is empty, as ROS has it."""
+    """Return position, velocity and effort by joint; what the run lacks is empty, as ROS has it.
+
+    Joints are called as the robot's own description does, or joint_1, ... where there is none.
+    """
     numbers = [known[part].values.tolist() if part in known else None for part in parts]
-    names = [f"joint_{i + 1}" for i in range(len(known[parts[0]].columns))]
+    count = len(known[parts[0]].columns)
+    names = list(joints) if len(joints) == count else [f"joint_{i + 1}" for i in range(count)]
 
     def message(row: int) -> Message:
         values = [rows[row] if rows is not None else [] for rows in numbers]

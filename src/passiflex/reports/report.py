@@ -7,13 +7,15 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
-from passiflex.files import whole_file
+from passiflex.files import OutputError, whole_file
 from passiflex.reports.header import content
 from passiflex.reports.page import page_text
 from passiflex.reports.screen import open_in_browser
 from passiflex.reports.viewer import read_viewer
 from passiflex.simulation import Run
 from passiflex.views import Viewed
+
+ENDINGS = (".html", ".htm")
 
 
 def report_text(run: Run, others: Sequence[Run | Viewed] = (), notices: Sequence[str] = ()) -> str:
@@ -39,8 +41,17 @@ def report_text(run: Run, others: Sequence[Run | Viewed] = (), notices: Sequence
 def write_report(
     run: Run, path: str | Path, others: Sequence[Run | Viewed] = (), notices: Sequence[str] = ()
 ) -> Path:
-    """Write the report of a run, whole or not at all, and return its path; the rest as for `report_text`."""
+    """Write the report of a run, whole or not at all, and return its path; the rest as for `report_text`.
+
+    Raises
+    ------
+    OutputError
+        If the file cannot be written, or its name does not end as that of a page: a run is not written over.
+    """
     path = Path(path)
+    if path.suffix not in ENDINGS:
+        needs = f"a file name that ends in {' or '.join(ENDINGS)}"
+        raise OutputError("wrong name for a report", got=str(path), needs=needs)
     text = report_text(run, others, notices)
     with whole_file(path) as temporary:
         temporary.write_text(text, encoding="utf-8", newline="\n")

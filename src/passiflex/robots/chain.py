@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
+from xml.sax.saxutils import quoteattr
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -100,12 +101,15 @@ class SerialChain:
         tip = self.tip_xyz + self.tip_rotation @ np.asarray(position, dtype=float)
         return replace(self, tip_xyz=tip, tip_rotation=self.tip_rotation @ turn)
 
-    def to_urdf(self) -> str:
+    def to_urdf(self, *, own_names: bool = False) -> str:
         """Return a canonical URDF document.
 
-        Links are `base`, `link_1`, ... and `tip`, joints `joint_1`, ...; no limit is written as ±1e9.
+        Links are `base`, `link_1`, ... and `tip`, joints `joint_1`, ...; no limit is written as ±1e9. With
+        `own_names`, robot and joints are called as in their source.
         """
-        out = ['<robot name="arm">', '<link name="base"/>']
+        names = [j.name for j in self.joints] if own_names else [f"joint_{i + 1}" for i in range(self.n)]
+        fixed = "tip_joint" + "_" * max(len(n) for n in names) if "tip_joint" in names else "tip_joint"
+        out = [f"<robot name={quoteattr(self.name if own_names else 'arm')}>", '<link name="base"/>']
         parent = "base"
         for i, (joint, body) in enumerate(zip(self.joints, self.bodies, strict=True), start=1):
             child = f"link_{i}"
@@ -115,7 +119,7 @@ class SerialChain:
                 f"  <inertial>{_tag('origin', xyz=body.com, rpy=np.zeros(3))}{_tag('mass', value=body.mass)}",
                 f"    {_tag('inertia', **dict(zip(COMPONENTS, body.inertia, strict=True)))}</inertial>",
                 "</link>",
-                f'<joint name="joint_{i}" type="{joint.kind}">',
+                f'<joint name={quoteattr(names[i - 1])} type="{joint.kind}">',
                 f'  <parent link="{parent}"/><child link="{child}"/>',
                 f"  {_tag('origin', xyz=joint.xyz, rpy=joint.rpy)}{_tag('axis', xyz=joint.axis)}",
                 f"  {_tag('limit', **limits)}",
@@ -124,7 +128,7 @@ class SerialChain:
             parent = child
         out += [
             '<link name="tip"/>',
-            '<joint name="tip_joint" type="fixed">',
+            f'<joint name="{fixed}" type="fixed">',
             f'  <parent link="{parent}"/><child link="tip"/>',
             f"  {_tag('origin', xyz=self.tip_xyz, rpy=rpy_of(self.tip_rotation))}",
             "</joint>",

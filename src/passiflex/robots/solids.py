@@ -76,7 +76,7 @@ def solids(chain: SerialChain) -> tuple[tuple[Solid, ...], ...]:
 
 def with_solids(chain: SerialChain) -> str:
     """Return the chain's canonical URDF with its solids as visuals; a capsule is a cylinder and two spheres."""
-    root = ET.fromstring(chain.to_urdf())
+    root = ET.fromstring(chain.to_urdf(own_names=True))
     links = {link.get("name"): link for link in root.iter("link")}
     for i, body in enumerate(solids(chain)):
         link = links[f"link_{i}" if i else "base"]

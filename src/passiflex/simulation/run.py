@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from passiflex.errors import RunFileError
 from passiflex.files import whole_file
 from passiflex.layout import Field, Layout
-from passiflex.simulation.run_file import FORMAT, defects, foreign, require_file, unreadable
+from passiflex.simulation.run_file import FORMAT, cut_short, defects, foreign, require_file, unreadable
 
 if TYPE_CHECKING:
     from passiflex.simulation.problem import Problem
@@ -70,7 +70,7 @@ class Run:
     @property
     def failure(self) -> str:
         """Return why the run ended early; empty if it did not."""
-        return str(self.data.attrs["failure"])
+        return str(self.data.attrs["failure"]) or cut_short(self.data)
 
     @property
     def events(self) -> list[dict[str, Any]]:
@@ -98,18 +98,19 @@ class Run:
             self.data.to_netcdf(temporary, engine="h5netcdf", encoding=compressed)
         return path
 
-    def show(self, out: str | Path | None = None, compare: Sequence[Run] = ()) -> Path:
+    def show(self, out: str | Path | None = None, compare: Sequence[Run | str | Path] = ()) -> Path:
         """Write the run as one HTML file that can be looked at and sent, and return its path.
 
         Without `out` it lies in a temporary folder and is opened in the browser, where there is a screen.
 
         Parameters
         ----------
-        compare: Runs to show beside this one.
+        compare: Runs to show beside this one, or the paths of their files.
         """
         from passiflex.reports import show
 
-        return show(self, out, compare)
+        beside = [compare] if isinstance(compare, Run | str | Path) else compare
+        return show(self, out, [run if isinstance(run, Run) else Run.load(run) for run in beside])
 
     @classmethod
     def load(cls, path: str | Path) -> Run:
@@ -199,7 +200,7 @@ def _description(problem: Problem) -> str:
     robot = problem.law.robot
     plant = robot.layout.unpack(problem.plant)
     arm = replace(robot.arm.chain, tip_xyz=plant["tool_position"], tip_rotation=plant["tool_rotation"])
-    return arm.to_urdf()
+    return arm.to_urdf(own_names=True)
 
 
 def _dims(f: Field) -> tuple[str, ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from pathlib import Path
 from typing import NamedTuple
 
@@ -44,6 +45,11 @@ CONTINUOUS = (
     *(f"{flow}_power" for flow in ("reference", "drawn", "spilled")),
 )
 ATTRIBUTES = ("name", "failure", "events", "has_tank", "configuration", "control_period")
+LOOKED_AT = (
+    "q", "theta", "dq", "dtheta", "position", "rotation", "desired_position", "desired_rotation", "tau_m", "tau_a",
+    "tau_e", "wrench", "torque_limit",
+)  # fmt: skip
+"""What people look at besides, and every run has."""
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
 
@@ -64,8 +70,38 @@ def defects(data: xr.Dataset) -> Defects:
     return Defects(tuple(missing), tuple(broken))
 
 
+def cut_short(data: xr.Dataset) -> str:
+    """Return where the rows of a run end if that is before its duration; a thinned run may end one row before."""
+    time, duration = data["time"].to_numpy(), float(data.attrs.get("duration", 0.0))
+    row = float(time[-1] - time[-2]) if time.size > 1 else 0.0
+    if not time.size or time[-1] >= duration * (1 - 1e-9) - row:
+        return ""
+    return f"its rows end at {time[-1]:.4g} s of {duration:.4g} s"
+
+
+def remarks(data: xr.Dataset, explained: Collection[str] = ()) -> list[str]:
+    """Return a sentence on the signals that a run lacks, but for the `explained`, and one on those with gaps."""
+    said = []
+    there = (*data.variables, *ATTRIBUTES, *explained)
+    missing = [name for name in (*defects(data).missing, *LOOKED_AT) if name not in there]
+    if missing:
+        said.append(f"The file lacks {', '.join(missing)}.")
+    first: dict[str, float] = {}
+    for name, values in data.data_vars.items():
+        if "time" in values.dims and values.dtype.kind == "f":
+            finite = np.isfinite(values.to_numpy()).all(axis=tuple(range(1, values.ndim)))
+            if not finite.all():
+                first[str(name)] = float(data["time"][int(np.argmin(finite))])
+    if first:
+        signals = ", ".join(f"{name} (first at {at:.4g} s)" for name, at in first.items())
+        said.append(f"Numbers that are not finite or too large, shown as gaps: {signals}.")
+    return said
+
+
 def require_file(path: Path) -> None:
     """Raise RunFileError unless there is a file."""
+    if path.is_dir():
+        raise RunFileError(f"{path} is a folder", needs="the file of a run")
     if not path.is_file():
         raise RunFileError(f"no such file: {path}", try_="passiflex simulate SCENARIO.yaml --out RUN.nc")
 
@@ -73,7 +109,11 @@ def require_file(path: Path) -> None:
 def unreadable(path: Path, error: Exception) -> RunFileError:
     """Return what to say of a file that no reader can open: whether it is a netCDF file at all, or the rest is lost."""
     if path.read_bytes()[: len(SIGNATURE)] != SIGNATURE:
-        return RunFileError(f"{path} is not a netCDF-4 file", got=type(error).__name__)
+        scenario = path.suffix in (".yaml", ".yml")
+        try_ = f"passiflex simulate {path} --out RUN.nc" if scenario else None
+        return RunFileError(
+            f"{path} is not a netCDF-4 file", needs="a file that passiflex simulate wrote", try_=try_
+        )
     return RunFileError(
         f"{path} is a netCDF file that is cut short or damaged",
         got=f"{path.stat().st_size} bytes, {type(error).__name__}",

@@ -10,7 +10,7 @@ import xarray as xr
 
 from passiflex.errors import RunFileError
 from passiflex.simulation.run import Run
-from passiflex.simulation.run_file import FORMAT, foreign, require_file, unreadable
+from passiflex.simulation.run_file import FORMAT, cut_short, foreign, remarks, require_file, unreadable
 from passiflex.simulation.sound import sound_signals
 
 KIND = FORMAT.rsplit(" ", 1)[0]
@@ -51,7 +51,7 @@ def salvage(path: str | Path) -> Salvaged:
     path = Path(path)
     require_file(path)
     notices: list[str] = []
-    data = _readable(path, notices)
+    data, in_file = _readable(path, notices)
     if not str(data.attrs.get("format", "")).startswith(f"{KIND} "):
         raise foreign(path, data)
     if data.attrs["format"] != FORMAT:
@@ -63,9 +63,7 @@ def salvage(path: str | Path) -> Salvaged:
     data = sound_signals(data, notices)
     if (lacking := _lacking(data)) is not None:
         raise RunFileError(f"{path} holds nothing that can be shown", got=lacking)
-    _note_gaps(data, notices)
-    _note_end(data, notices)
-    return Salvaged(Run(data), tuple(notices))
+    return Salvaged(Run(data), (*notices, *remarks(data, in_file), *_end(data)))
 
 
 def _lacking(data: xr.Dataset) -> str | None:
@@ -78,22 +76,22 @@ def _lacking(data: xr.Dataset) -> str | None:
     return None if shown else f"none of {', '.join(SHOWN)}"
 
 
-def _readable(path: Path, notices: list[str]) -> xr.Dataset:
-    """Return the variables that can be read, one by one: damage in one leaves the others."""
+def _readable(path: Path, notices: list[str]) -> tuple[xr.Dataset, list[str]]:
+    """Return the variables that can be read, one by one, as damage in one leaves the others; and the names of all."""
     try:
         with xr.open_dataset(path, engine="h5netcdf") as opened:
-            lost = []
-            for name in opened.variables:
+            lost, names = [], [str(name) for name in opened.variables]
+            for name in names:
                 try:
                     opened[name].load()
                 except Exception:  # the readers raise many kinds for damaged bytes
-                    lost.append(str(name))
+                    lost.append(name)
             data = opened.drop_vars(lost).load()
     except Exception as error:
         raise unreadable(path, error) from error
     if lost:
         notices.append(f"The file is damaged: {', '.join(lost)} could not be read.")
-    return data
+    return data, names
 
 
 def _with_attributes(data: xr.Dataset, notices: list[str]) -> xr.Dataset:
@@ -137,28 +135,10 @@ def _rows_in_order(data: xr.Dataset, notices: list[str]) -> xr.Dataset:
     return data.isel(time=slice(None, count))
 
 
-def _note_gaps(data: xr.Dataset, notices: list[str]) -> None:
-    """Say which signals have numbers that are not finite, and from when."""
-    first: dict[str, float] = {}
-    for name, values in data.data_vars.items():
-        if "time" in values.dims and values.dtype.kind == "f":
-            finite = np.isfinite(values.to_numpy()).reshape(data.sizes["time"], -1).all(axis=1)
-            if not finite.all():
-                first[str(name)] = float(data["time"][int(np.argmin(finite))])
-    if first:
-        signals = ", ".join(f"{name} (first at {at:.4g} s)" for name, at in first.items())
-        notices.append(f"Numbers that are not finite or too large, shown as gaps: {signals}.")
-
-
-def _note_end(data: xr.Dataset, notices: list[str]) -> None:
-    end, wanted = float(data["time"][-1]), float(data.attrs["duration"])
+def _end(data: xr.Dataset) -> list[str]:
+    """Return a sentence on why the run does not reach its duration, if it does not."""
     if data.attrs["failure"]:
-        notices.append(f"The run ended early, at {end:.4g} s of {wanted:.4g} s: {data.attrs['failure']}.")
-    elif end < wanted * (1 - 1e-9) - _row(data):
-        notices.append(f"The run is cut short: it ends at {end:.4g} s of {wanted:.4g} s.")
-
-
-def _row(data: xr.Dataset) -> float:
-    """Return the distance of rows [s]: a run that is thinned out may end one row before its duration."""
-    time = data["time"].to_numpy()
-    return float(time[-1] - time[-2]) if time.size > 1 else 0.0
+        end, wanted = float(data["time"][-1]), float(data.attrs["duration"])
+        return [f"The run ended early, at {end:.4g} s of {wanted:.4g} s: {data.attrs['failure']}."]
+    short = cut_short(data)
+    return [f"The run is cut short: {short}."] if short else []
