@@ -124,6 +124,17 @@ def test_it_is_said_what_was_held_back() -> None:
     assert {s.label for s in spans_of(bare)} == {"stiffness held back"}
 
 
+def test_a_stiffness_that_nobody_changes_is_not_held_back() -> None:
+    """With an empty tank its share is below 1 all the same; the shipped circle with a drag is such a run."""
+    reference = np.array([1, 0.5, 0.5, 1.0])
+    run = made_up(count=4, reference_share=reference, stiffness_share=np.zeros(4))
+    scenario = PUSHED | {"law": POSE, "reference": [], "forces": [], "control": CONTROL}
+    change = {"at": 0.1, "duration": 0.1, "stiffness": {"translation": 80, "rotation": 80}}
+    for gains, label in (([], "reference held back"), ([change], "reference and stiffness held back")):
+        known = altered(run, configuration=yaml.safe_dump(scenario | {"gains": gains}))
+        assert [s.label for s in spans_of(known) if s.kind == "governor"] == [label]
+
+
 def test_stretches_that_nearly_touch_are_one() -> None:
     run = shares([0, 1, 0, 1, 0, 0])
     close = Run(run.data.assign_coords(time=0.02 * np.arange(6)))

@@ -42,7 +42,8 @@ def spans_of(run: Run) -> tuple[Span, ...]:
     scenario, end = scenario_of(run), _end(run)
     forces = _forces(scenario) if scenario is not None else []
     inside = [s._replace(end=min(s.end, end)) for s in forces if s.start < end]
-    return (*inside, *_governed(run), *_fallback(run))
+    changing = scenario is None or bool(scenario.gains)
+    return (*inside, *_governed(run, GOVERNED if changing else GOVERNED[:1]), *_fallback(run))
 
 
 def _end(run: Run) -> float:
@@ -72,10 +73,15 @@ def _wrench(force: Force) -> str:
     return ", ".join(parts) or "force 0 N"
 
 
-def _governed(run: Run) -> list[Span]:
-    """Return when the reference or the stiffness was held back; each stretch lasts until the row after it."""
+def _governed(run: Run, names: tuple[str, ...]) -> list[Span]:
+    """Return when the reference or the stiffness was held back; each stretch lasts until the row after it.
+
+    Parameters
+    ----------
+    names: What was to change at all: the share of a stiffness that stays as it is says nothing.
+    """
     held = np.zeros(run.time.size, dtype=bool)
-    for name in GOVERNED:
+    for name in names:
         held |= _held_back(run, name)
     if "governed_time" in run.data:  # also between the rows of a thinned file
         held[1:] |= np.diff(run["governed_time"]) > 0
@@ -85,7 +91,7 @@ def _governed(run: Run) -> list[Span]:
             joined[-1] = (joined[-1][0], end)
         else:
             joined.append((start, end))
-    return [Span(start, end, _what_was_held(run, start, end), "governor") for start, end in joined]
+    return [Span(start, end, _what_was_held(run, names, start, end), "governor") for start, end in joined]
 
 
 def _held_back(run: Run, name: str) -> NDArray[np.bool_]:
@@ -93,10 +99,10 @@ def _held_back(run: Run, name: str) -> NDArray[np.bool_]:
     return run[share] < 1 if share in run.data else np.zeros(run.time.size, dtype=bool)
 
 
-def _what_was_held(run: Run, start: float, end: float) -> str:
+def _what_was_held(run: Run, names: tuple[str, ...], start: float, end: float) -> str:
     inside = (run.time >= start) & (run.time <= end)
-    names = [name for name in GOVERNED if (_held_back(run, name) & inside).any()]
-    return f"{' and '.join(names or GOVERNED[:1])} held back"
+    found = [name for name in names if (_held_back(run, name) & inside).any()]
+    return f"{' and '.join(found or GOVERNED[:1])} held back"
 
 
 def _fallback(run: Run) -> list[Span]:
