@@ -49,6 +49,11 @@ output_interval: 0.01
 """A step in continuous time, half a second of 51 rows."""
 
 
+def planar_text(**changes: Any) -> str:
+    """Return the planar arm's scenario in continuous time with other entries; None takes one out."""
+    return yaml.safe_dump(merged(yaml.safe_load(PLANAR), changes), sort_keys=False)
+
+
 def merged(data: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
     """Return the data with entries replaced, mappings completed, and what is None left out."""
     out = dict(data)

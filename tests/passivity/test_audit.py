@@ -22,22 +22,9 @@ from passiflex.passivity import (
 )
 from passiflex.simulation import Run, parse_scenario, simulate
 from passiflex.studies import shipped_scenario
+from worlds import planar_text
 
-PLANAR = """\
-name: planar
-robot: planar2r
-posture: [0.5, 0.8]
-law:
-  type: impedance
-  task: position
-  gravity: robot
-  shaped_stiffness: {ratio: 2}
-  shaped_inertia: {ratio: 0.5}
-  stiffness: {translation: 60}
-  damping: {translation: 20}
-duration: 1
-output_interval: 0.01
-"""
+PLANAR = planar_text(reference=None, duration=1)
 
 RIGID = """\
 name: rigid

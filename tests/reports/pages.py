@@ -14,29 +14,19 @@ from typing import Any
 import numpy as np
 import yaml
 
+from passiflex.reports.header import content
+from passiflex.reports.page import page_text
 from passiflex.reports.viewer import Viewer
 from passiflex.simulation import Run, parse_scenario, simulate
-from worlds import ran
+from worlds import planar_text, ran
 
 VIEWER = Viewer("window.viewer = 1;", "body { margin: 0 }", "a licence")
 """A bundle that shows nothing."""
-PLANAR = """\
-name: planar
-robot: planar2r
-posture: [0.5, 0.8]
-law:
-  type: impedance
-  task: position
-  gravity: robot
-  shaped_stiffness: {ratio: 2}
-  shaped_inertia: {ratio: 0.5}
-  stiffness: {translation: 60}
-  damping: {translation: 20}
-reference: [{at: 0.2, kind: step, by: [0, 0, 0.05]}]
-forces: [{from: 0.5, to: 0.6, force: [1, 0, 0]}]
-duration: 1
-output_interval: 0.01
-"""
+PLANAR = planar_text(
+    reference=[{"at": 0.2, "kind": "step", "by": [0, 0, 0.05]}],
+    forces=[{"from": 0.5, "to": 0.6, "force": [1, 0, 0]}],
+    duration=1,
+)
 TURRET = Path(__file__).parents[1] / "campaigns" / "turret.yaml"
 RIGID = {
     "name": "baseline",
@@ -147,3 +137,9 @@ def unpacked(blob: bytes, place: dict[str, Any]) -> np.ndarray:
     part = np.frombuffer(blob, np.uint8, count * size, place["offset"]).reshape(size, count)
     numbers = np.frombuffer(np.ascontiguousarray(part.T).tobytes(), f"<f{size}")
     return numbers.reshape(place["shape"])
+
+
+def page(run: Run, others: tuple = (), notices: tuple[str, ...] = ()) -> Page:
+    """Return the page on a run as its reader finds it."""
+    header, data = content(run, others, notices)
+    return Page.of(page_text(header["title"], header, data, VIEWER))

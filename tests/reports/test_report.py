@@ -8,25 +8,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
-from arms import serial_chains
 from passiflex.errors import PassiflexError
 from passiflex.files import OutputError
 from passiflex.passivity import audit, available_energy
 from passiflex.reports import report, report_text, show, write_report
-from passiflex.reports.arm import arm_header
-from passiflex.reports.header import NO_ARM, NO_VERDICT
 from passiflex.reports.metrics import sentence, verdict_header
 from passiflex.reports.thinning import CLOSE
 from passiflex.reports.viewer import read_viewer
-from passiflex.robots import SerialChain
-from passiflex.robots.frames import world_frames
-from passiflex.simulation import Run, parse_scenario, salvage, simulate
-from passiflex.simulation.run_arm import chain_of
+from passiflex.simulation import Run
 from passiflex.views import KINDS, Viewed, ideal_motion, panels
-from reports.pages import PLANAR, VIEWER, Page, baseline, changed, continuous, sampled, with_nan
+from reports.pages import VIEWER, Page, baseline, changed, continuous, page, sampled, with_nan
 
 ROUND_OFF = {"rtol": 2**-23, "atol": 1e-30}
 """What is left of a number in single precision."""
@@ -36,10 +28,6 @@ HOSTILE = "</script><script>alert(1)</script><!-- & \u2028 \"'"
 @pytest.fixture(autouse=True)
 def _viewer(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(report, "read_viewer", lambda: VIEWER)
-
-
-def page(run: Run, others: tuple = (), notices: tuple[str, ...] = ()) -> Page:
-    return Page.of(report_text(run, others, notices))
 
 
 def thick(run: Run, times: int) -> Run:
@@ -84,38 +72,6 @@ def test_frames_are_rows_of_the_run(make) -> None:
         assert frames["governed"] is None
     else:
         np.testing.assert_allclose(read.array(frames["governed"]), run["governed_position"], **ROUND_OFF)
-
-
-def test_the_arm_puts_the_end_effector_where_the_run_has_it() -> None:
-    run, read = continuous(), page(continuous())
-    tip = forward(read.header["arm"], read.array(read.header["frames"]["q"]))
-    np.testing.assert_allclose(tip, run["position"], atol=1e-6)
-
-
-@settings(max_examples=25, deadline=None)
-@given(serial_chains(1, 6), st.integers(0, 2**32 - 1))
-def test_any_arm_can_be_drawn_from_its_header(chain: SerialChain, seed: int) -> None:
-    q = np.random.default_rng(seed).uniform(-2, 2, (4, chain.n))
-    arm = arm_header(chain)
-    assert len(arm["solids"]) == chain.n + 1
-    np.testing.assert_allclose(forward(arm, q), world_frames(chain, q).position[:, -1], atol=1e-9)
-
-
-def forward(arm: dict, q: np.ndarray) -> np.ndarray:
-    """Return the end effector (N, 3) by the words of the format: each frame in that of the body before it."""
-    out = []
-    for row in q:
-        p, R = np.zeros(3), np.eye(3)
-        for joint, angle in zip(arm["joints"], row, strict=True):
-            axis = np.array(joint["axis"])
-            p, R = p + R @ joint["xyz"], R @ np.reshape(joint["rotation"], (3, 3))
-            if joint["kind"] == "prismatic":
-                p = p + R @ axis * angle
-            else:
-                K = np.cross(np.eye(3), axis)  # K v = axis × v
-                R = R @ (np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * K @ K)
-        out.append(p + R @ arm["tip"]["xyz"])
-    return np.array(out)
 
 
 @pytest.mark.parametrize("make", [continuous, baseline, sampled])
@@ -238,17 +194,6 @@ def test_labels_differ() -> None:
     assert [ghost["label"] for ghost in header["ghosts"]] == ["planar (2)", "planar (3)"]
 
 
-def test_another_arm_is_a_path_without_an_arm() -> None:
-    longer = simulate(parse_scenario(PLANAR + "tool: {position: [0.1, 0, 0]}\n"))
-    others = (longer, baseline(), continuous())
-    header = page(continuous(), others).header
-    assert [ghost["q"] is None for ghost in header["ghosts"]] == [True, True, False]
-    assert header["notices"] == [
-        f"{label} is shown without its arm: it is another arm, or its file does not say its kinematics."
-        for label in ("planar (2)", "baseline")
-    ]
-
-
 def test_a_long_run_is_thinned_without_losing_a_peak() -> None:
     run = thick(sampled(), 15)  # 9001 rows
     data = run.data.copy(deep=True)
@@ -330,94 +275,6 @@ def test_text_of_a_run_is_text_everywhere() -> None:
 def test_text_that_is_no_unicode(tmp_path: Path) -> None:
     written = write_report(changed(continuous(), name="a\udc80b"), tmp_path / "page.html")
     assert "<title>a?b</title>" in written.read_text(encoding="utf-8")
-
-
-def sliding() -> Run:
-    """Return a run that says to be of an arm whose second joint slides."""
-    chain = chain_of(continuous())
-    assert chain is not None
-    first, second = chain.joints
-    arm = replace(chain, joints=(first, second._replace(kind="prismatic")))
-    moved = continuous().data.copy(deep=True)
-    frames = world_frames(arm, continuous()["q"])
-    moved["position"][:], moved["rotation"][:] = frames.position[:, -1], frames.rotation[:, -1]
-    return changed(Run(moved), robot_description=arm.to_urdf())
-
-
-def test_a_joint_that_slides() -> None:
-    arm = page(sliding()).header["arm"]
-    assert [joint["kind"] for joint in arm["joints"]] == ["revolute", "prismatic"]
-
-
-DAMAGE = {
-    "one row": lambda: Run(sampled().data.isel(time=[0])),
-    "short": lambda: Run(continuous().data.isel(time=slice(0, 7))),
-    "failed": lambda: changed(Run(continuous().data.isel(time=slice(0, 30))), failure="it left the numbers"),
-    "no energies": lambda: changed(continuous(), without=("link_kinetic_energy", "joint_energy")),
-    "no motion": lambda: changed(
-        continuous(), without=("q", "theta", "position", "desired_position", "wrench")
-    ),
-    "no torques": lambda: changed(continuous(), without=("tau_m", "torque_limit")),
-    "all NaN": lambda: with_nan(continuous(), "position", slice(None)),
-    "NaN at the start": lambda: with_nan(sampled(), "tank_energy", slice(0, 5)),
-    "no configuration": lambda: changed(sampled(), configuration=""),
-    "no arm": lambda: changed(
-        continuous(), robot_description="<robot/>", configuration=PLANAR.replace("planar2r", "nobody")
-    ),
-    "infinite": lambda: Run(continuous().data.assign(tau_m=continuous().data["tau_m"] * np.inf)),
-}
-
-
-@pytest.mark.parametrize("damage", DAMAGE)
-def test_what_is_left_of_a_run_is_shown(damage: str) -> None:
-    read = page(DAMAGE[damage](), (), ("a notice",))
-    assert read.header["notices"][0] == "a notice"
-    assert read.header["panels"]
-    for panel in read.header["panels"]:
-        for curve in panel["curves"]:
-            times = read.array(read.header["times"][curve["time"]])
-            assert read.array(curve["values"]).shape == times.shape
-    count = read.array(read.header["frames"]["time"]).size
-    for name in ("q", "theta", "position"):
-        assert read.array(read.header["frames"][name]).shape[0] == count
-
-
-@pytest.mark.parametrize("damage", ["no energies", "NaN at the start"])
-def test_without_energies_there_is_no_verdict(damage: str) -> None:
-    header = page(DAMAGE[damage]()).header
-    assert header["verdict"] is None
-    assert NO_VERDICT in header["notices"]
-
-
-@pytest.mark.parametrize("damage", ["no motion", "no arm"])
-def test_without_kinematics_there_is_no_arm(damage: str) -> None:
-    header = page(DAMAGE[damage]()).header
-    assert header["arm"] is None
-    assert NO_ARM in header["notices"]
-
-
-def test_a_damaged_file_is_shown_as_far_as_it_can_be_read(tmp_path: Path) -> None:
-    cut = Run(sampled().data.isel(time=slice(0, 300)))
-    read = salvage(with_nan(cut, "tau_m", slice(20, 30)).save(tmp_path / "run.nc"))
-    shown = page(read.run, (), read.notices)
-    assert shown.header["notices"] == list(read.notices)
-    assert len(read.notices) == 2
-    _, torque = shown.curve("torque", "joint 1", "motor")
-    assert np.isnan(torque[20:30]).all()
-    assert np.isfinite(torque[30:]).all()
-
-
-def test_a_run_of_before_has_the_arm_of_the_catalogue() -> None:
-    data = continuous().data.copy()
-    del data.attrs["robot_description"]
-    assert page(Run(data)).header["arm"] == page(continuous()).header["arm"]
-    lost = Run(data.assign_attrs(configuration=data.attrs["configuration"].replace("planar2r", "nobody")))
-    header = page(lost).header
-    assert header["arm"] is None
-    assert header["verdict"]["verdict"] == audit(lost).verdict
-    names = [row["name"] for row in header["metrics"]["rows"]]
-    assert "margin" in names  # of the audit, which needs no robot
-    assert "torque share" not in names
 
 
 def test_a_report_is_written_whole_or_not_at_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

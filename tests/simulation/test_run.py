@@ -23,23 +23,9 @@ from passiflex.robots.chain import SerialChain
 from passiflex.simulation import Run, Scenario, parse_scenario, simulate
 from passiflex.simulation.run import package_version, source_commit
 from passiflex.simulation.run_file import FORMAT
+from worlds import planar_text
 
-PLANAR = """\
-name: planar
-robot: planar2r
-posture: [0.5, 0.8]
-law:
-  type: impedance
-  task: position
-  gravity: robot
-  shaped_stiffness: {ratio: 2}
-  shaped_inertia: {ratio: 0.5}
-  stiffness: {translation: 60}
-  damping: {translation: 20}
-reference: [{at: 0.2, kind: step, by: [0, 0, 0.05]}]
-duration: 1
-output_interval: 0.01
-"""
+PLANAR = planar_text(reference=[{"at": 0.2, "kind": "step", "by": [0, 0, 0.05]}], duration=1)
 
 DIVERGING = """\
 name: diverging

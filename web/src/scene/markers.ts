@@ -1,6 +1,6 @@
 /** Marks at points: the reference, the ideal mass, and the force as an arrow. */
 
-import { Color, ConeGeometry, CylinderGeometry, Group, Mesh, MeshBasicMaterial, MeshLambertMaterial, OctahedronGeometry, SphereGeometry, TorusGeometry, Vector3 } from "three";
+import { Color, ConeGeometry, CylinderGeometry, Group, Mesh, MeshBasicMaterial, MeshLambertMaterial, type Object3D, OctahedronGeometry, SphereGeometry, TorusGeometry, Vector3 } from "three";
 import type { Look } from "../theme.ts";
 import { along } from "./shapes.ts";
 
@@ -11,31 +11,14 @@ function flat(opacity = 1): MeshBasicMaterial {
   return new MeshBasicMaterial({ transparent: true, opacity, depthTest: false, depthWrite: false });
 }
 
-/** A jack of three bars with a ring, or an octahedron for the governed reference. */
-export class Marker {
-  readonly object = new Group();
-  #material = flat(0.9);
+/** A mark at a point, of one material. */
+class PointMark<Shape extends Object3D, Paint extends MeshBasicMaterial | MeshLambertMaterial> {
+  readonly object: Shape;
+  protected readonly material: Paint;
 
-  constructor(shape: "cross" | "octahedron", size: number) {
-    if (shape === "octahedron") {
-      const body = new Mesh(new OctahedronGeometry(0.55 * size), this.#material);
-      this.#material.wireframe = true;
-      this.object.add(body);
-    } else {
-      for (let i = 0; i < 3; i++) {
-        const bar = new Mesh(new CylinderGeometry(0.05 * size, 0.05 * size, 2 * size, 8), this.#material);
-        const end = new Vector3().setComponent(i, size);
-        along(bar, end.clone().negate(), end);
-        const ring = new Mesh(new TorusGeometry(0.62 * size, 0.035 * size, 6, 40), this.#material);
-        along(ring, new Vector3(), new Vector3());
-        if (i === 0) ring.rotation.y = Math.PI / 2;
-        if (i === 1) ring.rotation.x = Math.PI / 2;
-        this.object.add(bar, ring);
-      }
-    }
-    this.object.traverse((part) => {
-      part.renderOrder = 4;
-    });
+  constructor(object: Shape, material: Paint) {
+    this.object = object;
+    this.material = material;
   }
 
   /** Put it at a point [m]; false where the point is no number. */
@@ -46,28 +29,42 @@ export class Marker {
   }
 
   paint(look: Look): void {
-    this.#material.color = new Color(look.color);
+    this.material.color = new Color(look.color);
+  }
+}
+
+/** A jack of three bars with a ring, or an octahedron for the governed reference. */
+export class Marker extends PointMark<Group, MeshBasicMaterial> {
+  constructor(shape: "cross" | "octahedron", size: number) {
+    super(new Group(), flat(0.9));
+    if (shape === "octahedron") {
+      const body = new Mesh(new OctahedronGeometry(0.55 * size), this.material);
+      this.material.wireframe = true;
+      this.object.add(body);
+    } else {
+      for (let i = 0; i < 3; i++) {
+        const bar = new Mesh(new CylinderGeometry(0.05 * size, 0.05 * size, 2 * size, 8), this.material);
+        const end = new Vector3().setComponent(i, size);
+        along(bar, end.clone().negate(), end);
+        const ring = new Mesh(new TorusGeometry(0.62 * size, 0.035 * size, 6, 40), this.material);
+        along(ring, new Vector3(), new Vector3());
+        if (i === 0) ring.rotation.y = Math.PI / 2;
+        if (i === 1) ring.rotation.x = Math.PI / 2;
+        this.object.add(bar, ring);
+      }
+    }
+    this.object.traverse((part) => {
+      part.renderOrder = 4;
+    });
   }
 }
 
 /** A translucent ball. */
-export class Ball {
-  readonly object: Mesh;
-  #material = new MeshLambertMaterial({ transparent: true, opacity: 0.55, depthTest: false, depthWrite: false });
-
+export class Ball extends PointMark<Mesh, MeshLambertMaterial> {
   constructor(radius: number) {
-    this.object = new Mesh(new SphereGeometry(radius, 28, 18), this.#material);
+    const material = new MeshLambertMaterial({ transparent: true, opacity: 0.55, depthTest: false, depthWrite: false });
+    super(new Mesh(new SphereGeometry(radius, 28, 18), material), material);
     this.object.renderOrder = 2;
-  }
-
-  move(point: number[]): boolean {
-    const known = point.every(Number.isFinite);
-    if (known) this.object.position.set(point[0]!, point[1]!, point[2]!);
-    return known;
-  }
-
-  paint(look: Look): void {
-    this.#material.color = new Color(look.color);
   }
 }
 
