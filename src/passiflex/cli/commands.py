@@ -58,6 +58,7 @@ def simulate(
     """Run a scenario file and write the run as one netCDF file; exit status 2 if the run ended early."""
     from passiflex.files import require_writable
     from passiflex.simulation import load_scenario, resolve, simulate_problem
+    from passiflex.simulation.cautions import cautions
 
     with timed():
         with progress_lines() as report:
@@ -65,6 +66,8 @@ def simulate(
             read = load_scenario(scenario)
             require_writable(out.parent)
             problem = resolve(read)
+            for caution in cautions(problem):
+                report(f"note: {caution}")
             report(f"{read.name}: compiling and running")
             run = simulate_problem(problem)
         if run.failure:

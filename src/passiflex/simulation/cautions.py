@@ -1,0 +1,15 @@
+"""What an engineer should know of a problem before it runs, one line each: nothing here refuses anything."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from passiflex.simulation.problem import Problem
+
+CAUTIONS: tuple[Callable[[Problem], tuple[str, ...]], ...] = ()
+"""Who is asked, in the order in which the lines are printed."""
+
+
+def cautions(problem: Problem) -> tuple[str, ...]:
+    """Return what is worth a word before the run, in words."""
+    return tuple(line for ask in CAUTIONS for line in ask(problem))
