@@ -42,7 +42,7 @@ def self_motion(length: float) -> np.ndarray:
 
 
 def test_the_posture_spring_moves_the_elbow_and_not_the_hand() -> None:
-    """0.2 rad of self-motion: 1 % is left after 4 s. The hand moves 3 mm on the way, as M knows no motors.
+    """0.2 rad of self-motion: 1 % is left after 4 s. The hand moves 3 mm on the way, as N turns with the arm.
 
     Without the spring nothing moves at all.
     """
@@ -58,6 +58,30 @@ def test_the_posture_spring_moves_the_elbow_and_not_the_hand() -> None:
     free = simulate(iiwa("fig1", **calm))
     assert np.ptp(free["q"], axis=0).max() < 1e-9
     assert np.ptp(books(pulled)) < 1e-12
+
+
+@pytest.mark.parametrize(
+    "stiffness", [[20] * 7, [0, 0, 20, 0, 0, 0, 0], [1, 60, 5, 60, 1, 20, 3], [20, 0, 0, 0, 0, 0, 0]]
+)
+def test_the_posture_spring_rests_at_the_nearest_point(stiffness: list[float]) -> None:
+    """A posture that no self-motion reaches: the arm ends where ½ dᵀ K_n d is least along its self-motion.
+
+    Least by a walk along ker J that knows nothing of the law: 0.02 rad is what the walk's steps and the last of the
+    motion leave. A spring on the first joint alone is slack from the start, and moves nothing.
+    """
+    problem = resolve(iiwa("fig1"))
+    goal = problem.q + np.radians(30) * np.eye(7)[2]
+    actions = {"posture_stiffness": stiffness, "posture": goal.tolist()}
+    run = simulate(iiwa("fig1", actions=actions, duration=8.0, output_interval=0.01))
+    places = np.array([self_motion(s) for s in np.arange(-0.8, 0.81, 0.04)])
+    distance = ((places - goal) ** 2 @ np.array(stiffness)) / 2
+    low = int(np.argmin(distance))
+    assert 0 < low < len(places) - 1
+    a, b, _ = np.polyfit([-1, 0, 1], distance[low - 1 : low + 2], 2)
+    nearest = places[low] - b / (2 * a) * (places[low + 1] - places[low])
+    np.testing.assert_allclose(run["q"][-1], nearest, rtol=0, atol=0.02)
+    if not stiffness[2]:
+        assert np.ptp(run["q"], axis=0).max() < 1e-9
 
 
 FORCE = np.array([6.0, 0.0, -8.0])

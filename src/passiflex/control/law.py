@@ -70,6 +70,10 @@ class AbstractLaw(abc.ABC):
     def stored(self, y: Measurement, m: SimpleNamespace, g: SimpleNamespace) -> Stored:
         """Return the shaped motors and what they store beside the Cartesian spring."""
 
+    @abc.abstractmethod
+    def motors(self, m: SimpleNamespace, g: SimpleNamespace) -> cs.SX:
+        """Return the inertia (n,) with which the motors move, kg m²; with that of the links, what the task moves."""
+
 
 @final
 @dataclass(frozen=True, eq=False)
@@ -108,6 +112,10 @@ class ImpedanceLaw(AbstractLaw):
         motors, springs = _shaped_energies(phi, dphi, y.q, g)
         weight = self.gravity.compensation(arm, phi, K_e, m).storage
         return Stored(phi, dphi, arm.pose(phi, m), motors, springs, weight)
+
+    def motors(self, m: SimpleNamespace, g: SimpleNamespace) -> cs.SX:
+        """Return B_e."""
+        return g.shaped_inertia
 
     def outer(
         self, phi: cs.SX, q: cs.SX, reference: Reference, m: SimpleNamespace, g: SimpleNamespace

@@ -61,6 +61,10 @@ class RigidImpedanceLaw(AbstractLaw):
         motors, springs = _joint_energies(y, m)
         return Stored(q, dq, arm.pose(q, m), motors, springs, -arm.potential_energy(q, m))
 
+    def motors(self, m: SimpleNamespace, g: SimpleNamespace) -> cs.SX:
+        """Return B, whether the law knows of it or not."""
+        return m.motor_inertia
+
     def command(
         self,
         y: Measurement,

@@ -58,6 +58,10 @@ class AbstractTask(abc.ABC):
     def potential(self, pose: EndEffectorPose, desired: EndEffectorPose, stiffness: cs.SX) -> cs.SX:
         """Return U(x; x_d) [J] for the stiffness K_x (size, size)."""
 
+    @abc.abstractmethod
+    def error(self, pose: EndEffectorPose, desired: EndEffectorPose) -> cs.SX:
+        """Return x − x_d (size,) in world axes: exact for the position, to third order in the angle for the rest."""
+
     def spring(self, pose: EndEffectorPose, desired: EndEffectorPose, stiffness: cs.SX) -> Spring:
         """Return the potential with its exact gradients."""
         p, R = cs.SX.sym("p", 3), cs.SX.sym("R", 3, 3)
@@ -111,6 +115,11 @@ class PoseTask(AbstractTask):
         G = cs.trace(K_o) / 2 * cs.SX.eye(3) - K_o
         return cs.dot(e, K_t @ e) / 2 + cs.dot(e, K_c @ epsilon) + cs.trace(G @ (cs.SX.eye(3) - relative))
 
+    def error(self, pose: EndEffectorPose, desired: EndEffectorPose) -> cs.SX:
+        """Return the position error, and the axis of the turn from R_d to R times the sine of its angle."""
+        turn = pose.rotation @ desired.rotation.T
+        return cs.vertcat(pose.position - desired.position, cs.inv_skew(turn - turn.T) / 2)
+
 
 @dataclass(frozen=True)
 class PositionTask(AbstractTask):
@@ -122,3 +131,7 @@ class PositionTask(AbstractTask):
         """Return U [J]."""
         e = pose.position - desired.position
         return cs.dot(e, stiffness @ e) / 2
+
+    def error(self, pose: EndEffectorPose, desired: EndEffectorPose) -> cs.SX:
+        """Return the position error."""
+        return pose.position - desired.position

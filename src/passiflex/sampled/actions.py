@@ -10,12 +10,15 @@ from passiflex.control.null_space import inverse_cartesian_inertia
 from passiflex.layout import Field, Layout
 from passiflex.robots.linear_algebra import solve_spd
 
+FARTHEST = 1.0
+"""Most that the error of the end effector is taken to have moved the joints [rad], near a singular posture too."""
+
 
 def action_layout(n: int) -> Layout:
     """Return the parameters; a zero switches an action off."""
     return Layout(
         (
-            Field("posture_stiffness", (n,), "N m/rad", "of the spring in the null space"),
+            Field("posture_stiffness", (n,), "N m/rad", "K_n of the spring in the null space"),
             Field("posture_damping", (n,), "N m s/rad", "of the same motion"),
             Field("posture", (n,), "rad", "where that spring pulls the shaped motors to"),
             Field("follow_velocity", (), "1", "share of D_x ẋ_d that is fed forward"),
@@ -25,27 +28,37 @@ def action_layout(n: int) -> Layout:
 
 
 def posture_spring(
-    mass_matrix: cs.SX,
+    inertia: cs.SX,
     jacobian: cs.SX,
+    error: cs.SX,
     phi: cs.SX,
     dphi: cs.SX,
     regularisation: cs.SX,
     a: SimpleNamespace,
 ) -> cs.SX:
-    """Return N [K_n Nᵀ (φ_n − φ) − D_n Nᵀ φ̇] [N m], N = I − Jᵀ J̄ᵀ: toward a posture, no wrench at the end effector.
+    """Return N [K_n (φ_n − φ + J̄ e) − D_n Nᵀ φ̇] [N m], N = I − Jᵀ J̄ᵀ: toward a posture, no wrench at the end effector.
 
-    J̄ᵀ = Λ J M⁻¹, and J̄ᵀ N = 0. N stands on both sides, so that the stiffness is symmetric and ≥ 0; N K_n alone is
-    not, and flutters at a few N m/rad. N moves with the arm all the same, so that this spring is not conservative:
-    it can give energy on a closed path.
+    J̄ = M̃⁻¹ Jᵀ (J M̃⁻¹ Jᵀ + ε I)⁻¹, with the inertia M̃ that moves and J at φ, hides it from the end effector:
+    J̄ᵀ N = 0. As N keeps what acts along a self-motion z, it rests where zᵀ K_n (φ_n − φ) = 0 for all of them: at the
+    point of the self-motion nearest to the posture in the metric of K_n; and along the self-motion it gives exactly
+    what ½ (φ_n − φ)ᵀ K_n (φ_n − φ) loses.
+
+    φ − J̄ e is where the joints would be with the end effector on its reference, to first order in its error
+    e = x − x_d. So a motion of the end effector does not stretch this spring: its stiffness N K_n Nᵀ is symmetric
+    and ≥ 0, where that of N K_n (φ_n − φ) is not, and flutters at a few N m/rad. N moves with the arm all the same,
+    so that this spring is not conservative: it can give energy on a closed path.
     """
-    mobility = inverse_cartesian_inertia(mass_matrix, jacobian, regularisation)
+    mobility = inverse_cartesian_inertia(inertia, jacobian, regularisation)
 
-    def hidden(motion: cs.SX) -> cs.SX:
-        """Return Nᵀ times a motion: what of it the end effector does not see."""
-        return motion - solve_spd(mass_matrix, jacobian.T @ solve_spd(mobility, jacobian @ motion))
+    def joints(task_motion: cs.SX) -> cs.SX:
+        """Return J̄ times a motion of the end effector."""
+        return solve_spd(inertia, jacobian.T @ solve_spd(mobility, task_motion))
 
-    pull = a.posture_stiffness * hidden(a.posture - phi) - a.posture_damping * hidden(dphi)
-    return pull - jacobian.T @ solve_spd(mobility, jacobian @ solve_spd(mass_matrix, pull))
+    moved = joints(error)
+    moved /= cs.sqrt(1 + cs.sumsqr(moved) / FARTHEST**2)
+    pull = a.posture_stiffness * (a.posture - phi + moved)
+    pull -= a.posture_damping * (dphi - joints(jacobian @ dphi))
+    return pull - jacobian.T @ solve_spd(mobility, jacobian @ solve_spd(inertia, pull))
 
 
 def tracking_wrench(

@@ -151,7 +151,7 @@ class SampledController:
         granted = self._grant(now, held, held_stiffness, wish, latched, settled.level, elapsed, p)
         valve = (1 - latched) * self.tank.valve(granted.entry.level, p.tank) if self.tank else cs.SX(1)
         g.stiffness, g.damping = granted.stiffness, cs.if_else(latched, p.fallback.damping, wish.damping)
-        torque = valve * self._actions(y, now, wish, granted, g.damping, p, g.regularisation)
+        torque = valve * self._actions(y, now, wish, granted, g, p)
         if self.tank:
             brake = self.tank.braking(granted.entry.level, cs.dot(now.dphi, now.dphi), elapsed, p.tank)
             torque -= brake * now.dphi
@@ -252,19 +252,20 @@ class SampledController:
         now: Stored,
         wish: Wish,
         granted: _Granted,
-        damping: cs.SX,
+        g: SimpleNamespace,
         p: ControlParameters,
-        regularisation: cs.SX,
     ) -> cs.SX:
         """Return the torque of everything that only the tank's valve lets through (n,) N m."""
         arm, rows = self.law.robot.arm, slice(0, self.law.task.size)
         M, J = arm.mass_matrix(y.q, p.m), arm.jacobian(y.q, p.m)[rows, :]
         a = p.actions
         follow = granted.pose_share * tracking_wrench(
-            M, J, damping, wish.velocity[rows], wish.acceleration[rows], regularisation, a
+            M, J, g.damping, wish.velocity[rows], wish.acceleration[rows], g.regularisation, a
         )
         at_end = arm.jacobian(now.phi, p.m)
-        posture = posture_spring(M, J, now.phi, now.dphi, regularisation, a)
+        moving = M + cs.diag(self.law.motors(p.m, g))
+        error = self.law.task.error(now.pose, granted.pose)
+        posture = posture_spring(moving, at_end[rows, :], error, now.phi, now.dphi, g.regularisation, a)
         return at_end.T @ wish.wrench + at_end[rows, :].T @ follow + posture
 
 
