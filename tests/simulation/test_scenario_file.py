@@ -232,12 +232,12 @@ SHAPED = "shaped_stiffness: {ratio: 10}"
         (
             "60 N/m",
             "60 N s/m",
-            "line 9, column 28, law.stiffness.translation: expected N/m, one number, 3 numbers or 3×3, > 0; got '60 N s/m' (N s/m)",
+            "line 9, column 28, law.stiffness.translation: expected N/m, one number, 3 numbers or 3×3, ≥ 0; got '60 N s/m' (N s/m)",
         ),
         (
             "60 N/m",
-            "0 N/m",
-            "line 9, column 28, law.stiffness.translation: expected N/m, one number, 3 numbers or 3×3, > 0; got '0 N/m' (too small)",
+            "-1 N/m",
+            "line 9, column 28, law.stiffness.translation: expected N/m, one number, 3 numbers or 3×3, ≥ 0; got '-1 N/m' (too small)",
         ),
         (
             "60 N/m",

@@ -125,9 +125,10 @@ class ImpedanceLaw(AbstractLaw):
         J = arm.jacobian(phi, m)[rows, :]
         spring = self.task.spring(arm.pose(phi, m), reference.pose, g.stiffness)
         weight = self.gravity.compensation(arm, phi, g.shaped_stiffness, m)
-        J_q = arm.jacobian(q, m)[rows, :]
+        S, held = self.task.basis(reference.pose), list(self.task.held)
+        J_q = S.T @ arm.jacobian(q, m)[rows, :]
         null = null_space_damping(arm.mass_matrix(q, m), J_q, g.null_space_damping, g.regularisation)
-        cartesian = J.T @ g.damping @ J
+        cartesian = J.T @ S @ g.damping[held, held] @ S.T @ J
         return OuterLoop(weight.torque - J.T @ spring.gradient[rows], cartesian + null, cartesian)
 
     def command(
@@ -145,12 +146,12 @@ class ImpedanceLaw(AbstractLaw):
         phi, dphi = shaped_motion(y.q, y.theta, y.dq, y.dtheta, K, K_e)  # (11)
 
         M = arm.mass_matrix(y.q, m)
-        J_q = arm.jacobian(y.q, m)
+        J_q = self.task.basis(reference.pose).T @ arm.jacobian(y.q, m)[rows, :]
         J = arm.jacobian(phi, m)[rows, :]
         impedance = self.task.impedance(arm.pose(phi, m), reference.pose, J, J @ dphi, g.stiffness, g.damping)
         spring_damper = impedance.contribution  # (12)
         weight = self.gravity.compensation(arm, phi, K_e, m)
-        null = null_space_contribution(M, J_q[rows, :], g.null_space_damping, dphi, g.regularisation)  # (32)
+        null = null_space_contribution(M, J_q, g.null_space_damping, dphi, g.regularisation)  # (32)
         tau_u = spring_damper.torque + weight.torque + null.torque + added
 
         expected = solve_spd(M, y.tau_a + y.tau_e - arm.bias_torque(y.q, y.dq, m))

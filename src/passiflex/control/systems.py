@@ -85,16 +85,19 @@ def _impedance_loop(
 ) -> _Loop:
     arm, rows = law.robot.arm, slice(0, law.task.size)
     q, phi, p, z = cs.vertsplit(state, law.robot.n)
-    J = arm.jacobian(phi, m)[rows, :]
+    S, held = law.task.basis(desired), list(law.task.held)
+    J = S.T @ arm.jacobian(phi, m)[rows, :]
     M = arm.mass_matrix(q, m)
     D_e = cs.diag(shaped_damping(m.joint_stiffness, m.joint_damping, g.shaped_stiffness))
-    D_ns = null_space_damping(M, arm.jacobian(q, m)[rows, :], g.null_space_damping, g.regularisation)  # (35)
+    D_ns = null_space_damping(
+        M, S.T @ arm.jacobian(q, m)[rows, :], g.null_space_damping, g.regularisation
+    )  # (35)
     hamiltonian = (  # (14)
         shaped_hamiltonian(law.robot, q, phi, p, z, m, g)
         + law.task.potential(arm.pose(phi, m), desired, g.stiffness)
         + law.gravity.compensation(arm, phi, g.shaped_stiffness, m).storage
     )
-    return _Loop(hamiltonian, D_e, D_e + J.T @ g.damping @ J + D_ns)
+    return _Loop(hamiltonian, D_e, D_e + J.T @ g.damping[held, held] @ J + D_ns)
 
 
 def impedance_system(law: ImpedanceLaw) -> PortHamiltonianSystem:

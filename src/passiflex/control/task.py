@@ -49,10 +49,35 @@ class AbstractTask(abc.ABC):
     """Which part of the pose the spring and the damper act on.
 
     `size` rows of the Jacobian take part; K_x and D_x are (size, size). Translation is measured in
-    world axes; rotation in the axes of the reference frame.
+    world axes; the stiffness of the rotation in the axes of the reference frame, its damping in world axes.
+
+    The axes `free` (of size) have neither stiffness nor damping: a motion along them belongs to the
+    self-motion. A rotation can be free about axes of the reference frame, as that of a tool; then the
+    damping of the rotation is in the axes of the reference too.
     """
 
     size: ClassVar[int]
+    free: tuple[int, ...]
+
+    @property
+    def held(self) -> tuple[int, ...]:
+        """Return the axes that are not free."""
+        return tuple(i for i in range(self.size) if i not in self.free)
+
+    @property
+    def turned(self) -> bool:
+        """Return whether the damping of the rotation is in the axes of the reference, as its stiffness is."""
+        return any(i >= 3 for i in self.free)
+
+    def basis(self, desired: EndEffectorPose) -> cs.SX:
+        """Return S (size, rank), the directions that are held, as orthonormal columns in world axes.
+
+        Sᵀ J is the Jacobian of what spring and damper act on, and S D Sᵀ the damping in world axes.
+        """
+        axes = cs.SX.eye(self.size)
+        if self.turned:
+            axes = cs.diagcat(cs.SX.eye(3), desired.rotation)
+        return axes[:, list(self.held)]
 
     @abc.abstractmethod
     def potential(self, pose: EndEffectorPose, desired: EndEffectorPose, stiffness: cs.SX) -> cs.SX:
@@ -87,9 +112,11 @@ class AbstractTask(abc.ABC):
         `jacobian` is J(φ) (size, n) and `velocity` ẋ = J(φ) φ̇ (size,): the damper uses the geometric
         Jacobian, and dissipates whatever the orientation error.
         """
-        spring = self.spring(pose, desired, stiffness)
-        torque = -jacobian.T @ (spring.gradient[: self.size] + damping @ velocity)
-        dissipation = cs.dot(velocity, damping @ velocity)
+        spring, S, held = self.spring(pose, desired, stiffness), self.basis(desired), list(self.held)
+        moving = S.T @ velocity
+        wrench = damping[held, held] @ moving
+        torque = -jacobian.T @ (spring.gradient[: self.size] + S @ wrench)
+        dissipation = cs.dot(moving, wrench)
         return Impedance(Contribution(torque, spring.potential, dissipation), spring.reference_gradient)
 
 
@@ -102,9 +129,12 @@ class PoseTask(AbstractTask):
     with K_x = [[K_t, K_c], [K_cᵀ, K_o]], e = p − p_d and ε = ½ vee(R_dᵀR − RᵀR_d). The trace term is
     2 vᵀ K_o v with v the vector part of the quaternion of R_dᵀR, never less than ½ εᵀ K_o ε: so U is
     never less than ½ [e; ε]ᵀ K_x [e; ε], also with coupling, and is smooth everywhere.
+
+    Where K_o is 0 about an axis of the reference, U is 0 at every turn about it: a rotation about the tool is free.
     """
 
     size: ClassVar[int] = 6
+    free: tuple[int, ...] = ()
 
     def potential(self, pose: EndEffectorPose, desired: EndEffectorPose, stiffness: cs.SX) -> cs.SX:
         """Return U [J]."""
@@ -126,6 +156,7 @@ class PositionTask(AbstractTask):
     """Position only: U = ½ eᵀ K_x e with e = p − p_d; the orientation is free."""
 
     size: ClassVar[int] = 3
+    free: tuple[int, ...] = ()
 
     def potential(self, pose: EndEffectorPose, desired: EndEffectorPose, stiffness: cs.SX) -> cs.SX:
         """Return U [J]."""

@@ -257,16 +257,18 @@ class SampledController:
     ) -> cs.SX:
         """Return the torque of everything that only the tank's valve lets through (n,) N m."""
         arm, rows = self.law.robot.arm, slice(0, self.law.task.size)
-        M, J = arm.mass_matrix(y.q, p.m), arm.jacobian(y.q, p.m)[rows, :]
-        a = p.actions
+        S, held, a = self.law.task.basis(granted.pose), list(self.law.task.held), p.actions
+        M, J = arm.mass_matrix(y.q, p.m), S.T @ arm.jacobian(y.q, p.m)[rows, :]
+        velocity, acceleration = S.T @ wish.velocity[rows], S.T @ wish.acceleration[rows]
         follow = granted.pose_share * tracking_wrench(
-            M, J, g.damping, wish.velocity[rows], wish.acceleration[rows], g.regularisation, a
+            M, J, g.damping[held, held], velocity, acceleration, g.regularisation, a
         )
         at_end = arm.jacobian(now.phi, p.m)
+        J_held = S.T @ at_end[rows, :]
         moving = M + cs.diag(self.law.motors(p.m, g))
-        error = self.law.task.error(now.pose, granted.pose)
-        posture = posture_spring(moving, at_end[rows, :], error, now.phi, now.dphi, g.regularisation, a)
-        return at_end.T @ wish.wrench + at_end[rows, :].T @ follow + posture
+        error = S.T @ self.law.task.error(now.pose, granted.pose)
+        posture = posture_spring(moving, J_held, error, now.phi, now.dphi, g.regularisation, a)
+        return at_end.T @ wish.wrench + J_held.T @ follow + posture
 
 
 def _chosen(flag: cs.SX, then: SimpleNamespace, other: SimpleNamespace) -> SimpleNamespace:

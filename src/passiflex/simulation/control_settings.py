@@ -7,7 +7,13 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from passiflex.simulation.law_settings import Damping, ShapedInertia, ShapedStiffness, Stiffness
+from passiflex.simulation.law_settings import (
+    Damping,
+    ShapedInertia,
+    ShapedStiffness,
+    Stiffness,
+    free_mistakes,
+)
 from passiflex.simulation.quantity import Quantity, shown
 from passiflex.simulation.section import Mistakes, Section
 
@@ -184,25 +190,28 @@ class GainChange(Section):
     damping: Damping | None = Field(default=None, description="D_x at the end; stays if left out")
 
 
-def change_mistakes(changes: Sequence[GainChange], task: str) -> Found:
+def change_mistakes(changes: Sequence[GainChange], task: str, free: tuple[int, ...]) -> Found:
     """Return what of the changes overlaps, or does not fit the task."""
     found: Found = []
     for i, change in enumerate(changes):
         if i and not change.at >= changes[i - 1].at + changes[i - 1].duration - NOW:
             found.append(((i, "at"), f"the change before lasts longer; got {change.at:g} s"))
-        found += [((i, *place), text) for place, text in gain_mistakes(change, task)]
+        found += [((i, *place), text) for place, text in gain_mistakes(change, task, free)]
     return found
 
 
-def gain_mistakes(given: Fallback | GainChange, task: str) -> Found:
-    """Return what of the gains does not fit the task."""
+def gain_mistakes(given: Fallback | GainChange, task: str, free: tuple[int, ...]) -> Found:
+    """Return what of the gains does not fit the task, whose axes `free` they have to leave free."""
     found: Found = []
     if given.damping is not None and given.damping.ratio is not None:
         found.append((("damping",), "a damping ratio belongs to one posture; give D_x itself"))
     for name, part in (("stiffness", given.stiffness), ("damping", given.damping)):
         try:
-            if part is not None:
-                part.require(task)
+            if part is None:
+                continue
+            part.require(task)
         except Mistakes as mistakes:
             found += [((name, *place), text) for place, text in mistakes.entries]
+        else:
+            found += [((name,), text) for text in [free_mistakes(part, free)] if text]
     return found

@@ -8,10 +8,11 @@ from numpy.typing import NDArray
 from passiflex.control.damping_design import damping_from_ratio
 from passiflex.control.law import AbstractLaw
 from passiflex.control.tank import NO_CAP, EnergyTank
+from passiflex.control.task import AbstractTask
 from passiflex.errors import SizeError
 from passiflex.robots.flexible import FlexibleJointRobot
-from passiflex.simulation.law_settings import ImpedanceSettings, RigidSettings, ShapedInertia, ShapedStiffness
-from passiflex.simulation.posture import Posture
+from passiflex.simulation.law_settings import ImpedanceSettings, ShapedInertia, ShapedStiffness
+from passiflex.simulation.posture import Posture, held_jacobian
 from passiflex.simulation.problem import TankStart
 from passiflex.simulation.scenario import Scenario
 
@@ -35,7 +36,13 @@ def law_gains(
             "law.shaped_stiffness", s.shaped_stiffness, model["joint_stiffness"], robot
         )
         gains["shaped_inertia"] = sized("law.shaped_inertia", s.shaped_inertia, model["motor_inertia"], robot)
-        gains["damping"] = _damping(s, world, _natural_inertia(law.task.size, start, s.regularisation))
+        gains["damping"] = (
+            s.damping.full()
+            if s.damping.ratio is None
+            else _designed(
+                law.task, stiffness, start, gains["shaped_inertia"], s.regularisation, s.damping.ratio
+            )
+        )
         return gains
     carried = model["motor_inertia"] if s.motor_inertia == "carried" else np.zeros(robot.n)
     if s.target_inertia.damping_ratio is not None:
@@ -44,7 +51,9 @@ def law_gains(
         target = s.target_inertia.full()
     return gains | {
         "target_inertia": target,
-        "damping": _damping(s, world, target),
+        "damping": s.damping.full()
+        if s.damping.ratio is None
+        else damping_from_ratio(world, target, s.damping.ratio),
         "carried_inertia": carried,
     }
 
@@ -85,18 +94,21 @@ def sized(
         ) from error
 
 
-def _damping(s: ImpedanceSettings | RigidSettings, stiffness: Array, inertia: Array) -> Array:
-    return (
-        s.damping.full()
-        if s.damping.ratio is None
-        else damping_from_ratio(stiffness, inertia, s.damping.ratio)
-    )
+def _designed(
+    task: AbstractTask, stiffness: Array, start: Posture, motors: Array, regularisation: float, ratio: float
+) -> Array:
+    """Return the D_x (k, k) with which every mode of the directions that are held has a damping ratio.
 
-
-def _natural_inertia(size: int, start: Posture, regularisation: float) -> Array:
-    J = start.jacobian[:size]
-    mobility: Array = J @ np.linalg.solve(start.mass_matrix, J.T) + regularisation * np.eye(size)  # (31)
-    return _symmetric(np.linalg.inv(mobility).astype(np.float64))
+    The inertia is that of all that moves, links and motors as the law shapes them: (J (M + B_e)⁻¹ Jᵀ + ε I)⁻¹.
+    """
+    J = held_jacobian(task, start)
+    moving = start.mass_matrix + np.diag(motors)
+    inertia = np.linalg.inv(J @ np.linalg.solve(moving, J.T) + regularisation * np.eye(len(J)))
+    axes = np.ix_(task.held, task.held)
+    damping = np.zeros_like(stiffness)
+    held = stiffness if task.turned else in_world(stiffness, start.pose.rotation)
+    damping[axes] = damping_from_ratio(held[axes], _symmetric(inertia.astype(np.float64)), ratio)
+    return damping
 
 
 def _symmetric(matrix: Array) -> Array:

@@ -28,19 +28,40 @@ def _definite(matrix: Matrix) -> Matrix:
     return matrix
 
 
+def _free(matrix: Matrix) -> tuple[int, ...]:
+    """Return the axes without any gain."""
+    return tuple(i for i, row in enumerate(matrix) if not any(row))
+
+
+def _held(matrix: Matrix) -> Matrix:
+    """Return a matrix that is symmetric, and positive definite but for axes that are free."""
+    held = np.delete(np.array(matrix), _free(matrix), axis=0)
+    if len(held):
+        _definite(tuple(map(tuple, np.delete(held, _free(matrix), axis=1).tolist())))
+    if np.any(np.array(matrix)[:, list(_free(matrix))]):
+        raise ValueError("the matrix is not symmetric: a free axis has zeros in its row and column")
+    return matrix
+
+
 def _block(value: float | Vector | Matrix) -> Matrix:
     """Return the 3×3 block of one number, 3 numbers or 3×3."""
     if np.ndim(value) == 2:
-        return _definite(value)  # type: ignore[arg-type]
+        return value  # type: ignore[return-value]
     return tuple(map(tuple, np.diag(np.broadcast_to(value, 3)).tolist()))
 
 
-def _three(unit: str) -> Quantity:
-    return Quantity(unit, ((), (3,), (3, 3)), above=0)
+def _three(unit: str, **bound: float) -> Quantity:
+    return Quantity(unit, ((), (3,), (3, 3)), **bound)  # type: ignore[arg-type]
 
 
-_BLOCK = AfterValidator(_block)
-_FULL = Annotated[Matrix, Quantity("", ((3, 3), (6, 6))), AfterValidator(_definite)]
+def _said(axes: tuple[int, ...]) -> str:
+    """Return the names of axes: translation x, rotation z."""
+    return ", ".join(f"{('translation', 'rotation')[i // 3]} {'xyz'[i % 3]}" for i in axes) or "none"
+
+
+_BLOCK = AfterValidator(_block), AfterValidator(_held)
+_DEFINITE_BLOCK = AfterValidator(_block), AfterValidator(_definite)
+_FULL = Annotated[Matrix, Quantity("", ((3, 3), (6, 6)))]
 
 
 class _Shaped(Section):
@@ -88,12 +109,12 @@ class ShapedInertia(_Shaped):
 
 
 class _Gains(Section):
-    """A symmetric positive definite matrix of the task, by its blocks or as a whole."""
+    """A symmetric positive definite matrix of the task, by its blocks or as a whole; zero in axes that are free."""
 
     alternative: ClassVar[str | None] = None
     translation: Matrix | None = Field(default=None, description="translational block")
     rotation: Matrix | None = Field(default=None, description="rotational block; with task pose only")
-    matrix: _FULL | None = Field(
+    matrix: Annotated[_FULL, AfterValidator(_held)] | None = Field(
         default=None, description="the whole matrix in SI units: 6×6, or 3×3 for task position"
     )
 
@@ -107,7 +128,14 @@ class _Gains(Section):
             )
         if self.rotation is not None and given != ["translation"]:
             raise Mistakes((("rotation",), "goes with translation only; remove it"))
+        if given != [self.alternative] and len(self.free) == len(self.full()):
+            raise ValueError("is zero in all directions; needs more than 0 in those that are not free")
         return self
+
+    @property
+    def free(self) -> tuple[int, ...]:
+        """Return the axes of the task that are zero; not for gains given by a ratio."""
+        return _free(tuple(map(tuple, self.full().tolist())))
 
     def require(self, task: str) -> None:
         """Raise Mistakes unless the size is that of the task."""
@@ -137,11 +165,12 @@ class _Gains(Section):
 class Stiffness(_Gains):
     """K_x."""
 
-    translation: Annotated[Matrix, _three("N/m"), _BLOCK] | None = Field(
-        default=None, description="one number, 3 numbers or 3×3, N/m"
+    translation: Annotated[Matrix, _three("N/m", least=0), *_BLOCK] | None = Field(
+        default=None, description="one number, 3 numbers or 3×3, N/m, world axes; 0 for a free axis"
     )
-    rotation: Annotated[Matrix, _three("N m/rad"), _BLOCK] | None = Field(
-        default=None, description="one number, 3 numbers or 3×3, N m/rad; with task pose only"
+    rotation: Annotated[Matrix, _three("N m/rad", least=0), *_BLOCK] | None = Field(
+        default=None,
+        description="one number, 3 numbers or 3×3, N m/rad, axes of the reference; 0 for a free axis",
     )
 
 
@@ -149,14 +178,18 @@ class Damping(_Gains):
     """D_x."""
 
     alternative: ClassVar[str | None] = "ratio"
-    translation: Annotated[Matrix, _three("N s/m"), _BLOCK] | None = Field(
-        default=None, description="one number, 3 numbers or 3×3, N s/m"
+    translation: Annotated[Matrix, _three("N s/m", least=0), *_BLOCK] | None = Field(
+        default=None, description="one number, 3 numbers or 3×3, N s/m, world axes; 0 for a free axis"
     )
-    rotation: Annotated[Matrix, _three("N m s/rad"), _BLOCK] | None = Field(
-        default=None, description="one number, 3 numbers or 3×3, N m s/rad; with task pose only"
+    rotation: Annotated[Matrix, _three("N m s/rad", least=0), *_BLOCK] | None = Field(
+        default=None,
+        description="one number, 3 numbers or 3×3, N m s/rad; world axes, with a free rotation those of the "
+        "reference; 0 for a free axis",
     )
     ratio: Positive | None = Field(
-        default=None, description="damping ratio of every mode at the start posture"
+        default=None,
+        description="damping ratio of every mode at the start posture, with the inertia of links and motors as "
+        "the law shapes them",
     )
 
 
@@ -164,10 +197,13 @@ class TargetInertia(_Gains):
     """M_x."""
 
     alternative: ClassVar[str | None] = "damping_ratio"
-    translation: Annotated[Matrix, _three("kg"), _BLOCK] | None = Field(
+    matrix: Annotated[_FULL, AfterValidator(_definite)] | None = Field(
+        default=None, description="the whole matrix in SI units: 6×6, or 3×3 for task position"
+    )
+    translation: Annotated[Matrix, _three("kg", above=0), *_DEFINITE_BLOCK] | None = Field(
         default=None, description="one number, 3 numbers or 3×3, kg"
     )
-    rotation: Annotated[Matrix, _three("kg m^2"), _BLOCK] | None = Field(
+    rotation: Annotated[Matrix, _three("kg m^2", above=0), *_DEFINITE_BLOCK] | None = Field(
         default=None, description="one number, 3 numbers or 3×3, kg m^2; with task pose only"
     )
     damping_ratio: Positive | None = Field(
@@ -195,6 +231,13 @@ class _LawSettings(Section):
             gains.require(info.data["task"])
         return gains
 
+    @model_validator(mode="after")
+    def _free_in_both(self) -> Self:
+        found = free_mistakes(self.damping, self.stiffness.free)
+        if found:
+            raise Mistakes((("damping",), found))
+        return self
+
 
 class ImpedanceSettings(_LawSettings):
     """The paper's law."""
@@ -221,3 +264,19 @@ class RigidSettings(_LawSettings):
     motor_inertia: Literal["ignored", "carried"] = Field(
         default="ignored", description="whether the law adds the motor inertia to that of the links"
     )
+
+    @model_validator(mode="after")
+    def _holds_all(self) -> Self:
+        if free := self.stiffness.free:
+            what = "the rigid law gives every direction an inertia, and none can be free"
+            raise Mistakes((("stiffness",), f"{what}; got {_said(free)}; try law type: impedance"))
+        return self
+
+
+def free_mistakes(gains: Stiffness | Damping, free: tuple[int, ...]) -> str:
+    """Return what is wrong with gains whose free axes need to be these; nothing if they are, or go by a ratio."""
+    if getattr(gains, "ratio", None) is not None or gains.free == free:
+        return ""
+    needs = f"zero in {_said(free)}" if free else "more than 0 in every direction"
+    what = f"needs {needs}, as the law's stiffness; got zero in {_said(gains.free)}"
+    return f"{what}; a free direction has neither stiffness nor damping: null_space_damping damps it"

@@ -9,8 +9,9 @@ import casadi as cs
 import numpy as np
 from numpy.typing import NDArray
 
+from passiflex.control.task import AbstractTask
 from passiflex.errors import ValueRangeError
-from passiflex.robots.arm import SerialArm
+from passiflex.robots.arm import EndEffectorPose, SerialArm
 from passiflex.robots.flexible import FlexibleJointRobot
 from passiflex.simulation.motion import Pose
 from passiflex.simulation.problem import Problem
@@ -37,8 +38,15 @@ def posture(robot: FlexibleJointRobot, q: Array, parameters: dict[str, Array]) -
     return Posture(Pose(p.ravel(), R), J, M, gravity.ravel())
 
 
+def held_jacobian(task: AbstractTask, at: Posture) -> Array:
+    """Return the rows of J for the directions that a task holds, with its reference at that pose."""
+    pose = EndEffectorPose(cs.SX(at.pose.position), cs.SX(at.pose.rotation))
+    basis = np.array(cs.evalf(cs.densify(task.basis(pose))))
+    return np.asarray(basis.T @ at.jacobian[: task.size])
+
+
 def natural_inertia(problem: Problem) -> Array:
-    """Return Λ of (31) at the start, with the numbers of the plant; (k, k) for the size k of the task.
+    """Return Λ of (31) at the start, with the numbers of the plant, in the directions that the task holds.
 
     Raises
     ------
@@ -47,7 +55,7 @@ def natural_inertia(problem: Problem) -> Array:
     """
     robot = problem.law.robot
     start = posture(robot, problem.q, robot.layout.unpack(problem.plant))
-    J = start.jacobian[: problem.law.task.size]
+    J = held_jacobian(problem.law.task, start)
     mobility = J @ np.linalg.solve(start.mass_matrix, J.T)
     if not np.linalg.cond(mobility) < 1 / SINGULAR**2:
         raise ValueRangeError(

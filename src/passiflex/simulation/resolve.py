@@ -9,13 +9,13 @@ from pydantic import ValidationError
 from passiflex.control.gravity import AbstractGravity, MotorGravity, RobotGravity, StaticGravity
 from passiflex.control.law import AbstractLaw, ImpedanceLaw
 from passiflex.control.rigid import RigidImpedanceLaw
-from passiflex.control.task import AbstractTask, PoseTask, PositionTask
+from passiflex.control.task import PoseTask, PositionTask
 from passiflex.errors import SizeError, ValueRangeError
 from passiflex.robots.flexible import FlexibleJointRobot
 from passiflex.simulation.gains import law_gains, tank_gains, tank_start
 from passiflex.simulation.law_settings import RigidSettings
 from passiflex.simulation.model_errors import AbstractRelative
-from passiflex.simulation.posture import SINGULAR, posture
+from passiflex.simulation.posture import SINGULAR, held_jacobian, posture
 from passiflex.simulation.problem import Noise, Problem
 from passiflex.simulation.sampling import sampling
 from passiflex.simulation.scenario import Scenario
@@ -25,7 +25,7 @@ from passiflex.simulation.timeline import timeline
 Array = NDArray[np.float64]
 
 STANDARD_GRAVITY = (0.0, 0.0, -9.81)
-TASKS: dict[str, AbstractTask] = {"pose": PoseTask(), "position": PositionTask()}
+TASKS: dict[str, type[PoseTask] | type[PositionTask]] = {"pose": PoseTask, "position": PositionTask}
 GRAVITIES: dict[str, AbstractGravity] = {
     "robot": RobotGravity(),
     "motor": MotorGravity(),
@@ -66,7 +66,8 @@ def resolve(scenario: Scenario, robot: FlexibleJointRobot | None = None) -> Prob
     plant = _scaled(described, "deviations", scenario.deviations, robot)
     model = _scaled(described, "model_errors", scenario.model_errors, robot)
     at_start = posture(robot, q, plant)
-    _refuse_singular(scenario, at_start.jacobian[: law.task.size])
+    _refuse_too_few(law)
+    _refuse_singular(scenario, held_jacobian(law.task, at_start))
     gains = law_gains(scenario, law, model, posture(robot, q, model))
     if isinstance(law.gravity, StaticGravity) and "shaped_stiffness" in gains:
         _refuse_soft(robot, q, model, gains["shaped_stiffness"])
@@ -110,7 +111,8 @@ def _checked(scenario: Scenario) -> Scenario:
 
 def _law(scenario: Scenario, robot: FlexibleJointRobot) -> AbstractLaw:
     kind = RigidImpedanceLaw if isinstance(scenario.law, RigidSettings) else ImpedanceLaw
-    return kind(robot, TASKS[scenario.law.task], GRAVITIES[scenario.law.gravity])
+    task = TASKS[scenario.law.task](free=scenario.law.stiffness.free)
+    return kind(robot, task, GRAVITIES[scenario.law.gravity])
 
 
 def _start(scenario: Scenario, robot: FlexibleJointRobot) -> Array:
@@ -132,6 +134,18 @@ def _start(scenario: Scenario, robot: FlexibleJointRobot) -> Array:
             try_="degrees written with their unit, as '30 deg'" if np.abs(q[i]) > 7 else None,
         )
     return q
+
+
+def _refuse_too_few(law: AbstractLaw) -> None:
+    """Raise ValueRangeError for a pose that has more directions to hold than the robot has joints."""
+    held = len(law.task.held)
+    if isinstance(law.task, PoseTask) and law.robot.n < held:
+        raise ValueRangeError(
+            f"task 'pose' holds {held} directions, more than robot {law.robot.name!r} can move in",
+            got=f"{law.robot.n} joints",
+            needs="at least as many joints as directions that are held",
+            try_="task: position, or free directions: stiffness and damping 0 in them, as rotation: [30, 30, 0]",
+        )
 
 
 def _refuse_singular(scenario: Scenario, jacobian: Array) -> None:

@@ -202,7 +202,7 @@ class Scenario(Section):
             if control.inner_loop == "matched":
                 raise Mistakes((("inner_loop",), "the rigid law has no inner loop; take plain"))
             return control
-        found = gain_mistakes(control.fallback, info.data["law"].task)
+        found = gain_mistakes(control.fallback, info.data["law"].task, info.data["law"].stiffness.free)
         if found:
             raise Mistakes(*((("fallback", *place), text) for place, text in found))
         return control
@@ -219,7 +219,8 @@ class Scenario(Section):
     def _gains_of_the_task(
         cls, changes: tuple[GainChange, ...], info: ValidationInfo
     ) -> tuple[GainChange, ...]:
-        found = change_mistakes(changes, info.data["law"].task) if "law" in info.data else []
+        law = info.data.get("law")
+        found = change_mistakes(changes, law.task, law.stiffness.free) if law else []
         if found:
             raise Mistakes(*found)
         return changes

@@ -25,10 +25,12 @@ def ideal_motion(run: Run) -> Array | None:
     """Return the displacement of M_x ẍ + D_x ẋ + K_x (x − x_d) = F_e at the rows of a run, (N, 3) m.
 
     None if the configuration cannot be read or its robot not be found, and where something acts that the
-    ideal does not know: gains that change in flight, drags, feed-forward wrenches.
+    ideal does not know: gains that change in flight, drags, feed-forward wrenches, directions that are free.
     """
     scenario = scenario_of(run)
     if scenario is None or scenario.gains or scenario.drags or scenario.feedforward:
+        return None
+    if scenario.law.stiffness.free:
         return None
     gains = _gains(scenario)
     if gains is None:
