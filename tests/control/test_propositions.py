@@ -32,7 +32,7 @@ from passiflex.robots.flexible import FlexibleJointRobot
 from passiflex.simulation.closed_loop import ENERGIES
 
 RELATIVE = 1e-9
-TASKS = (PoseTask(), PositionTask())
+TASKS = (PoseTask(), PositionTask(), PoseTask(free=(0, 5)))
 GRAVITIES = (RobotGravity(), MotorGravity(), StaticGravity())
 FILLS = (1.0, 0.0, 0.37)
 

@@ -16,7 +16,7 @@ from loops import SEEDS, definite, rotation
 from passiflex.control import AbstractTask, PoseTask, PositionTask
 from passiflex.robots.arm import EndEffectorPose
 
-TASKS = (PoseTask(), PositionTask())
+TASKS = (PoseTask(), PositionTask(), PoseTask(free=(0, 5)))
 STEP = 6e-6
 """ε^⅓: truncation (STEP²) and rounding (ε/STEP) of a central difference are both 4e-11 of the scale."""
 DIFFERENCE = 1e-8
