@@ -140,7 +140,7 @@ def test_what_is_left_out() -> None:
 
 
 @pytest.mark.parametrize(
-    "text", [GOOD, RIGID, changed("kind: port", "kind: time_domain, braking: 3, power: 9")]
+    "text", [GOOD, RIGID, changed("kind: port", "kind: time_domain, braking: 3, floor: 20 mJ")]
 )
 def test_the_resolved_scenario_loads_to_an_equal_one(text: str) -> None:
     s = parse_scenario(text)
@@ -185,11 +185,11 @@ ONLY = "needs `control`: only a sampled run has it"
         ("torque_limit: robot", "coulomb_friction: [1, -1]", "line 14, column 28, motors.coulomb_friction: expected N m, one number or a list of numbers, ≥ 0; got [1, -1] (too small)"),
         # tank
         ("kind: port", "kind: prt", "line 15, column 14, tank.kind: unknown word 'prt'; try 'port'"),
-        ("kind: port", "kind: port, trip: 0.1", "line 15, column 26, tank.trip: needs less than the floor of 0.1 J; got 0.1 J"),
+        ("kind: port", "kind: port, trip: 0.1", "line 15, column 26, tank.trip: needs less than the floor of 0.1 J (the default); got 0.1 J"),
         ("kind: port", "trip: 0.3, floor: 0.15", "line 15, column 14, tank.trip: needs less than the floor of 0.15 J; got 0.3 J"),
         ("kind: port", "initial: 0.1", "line 15, column 17, tank.initial: a tank started empty never moves the reference; got 0.1 J; needs more than the floor of 0.1 J"),
         ("kind: port", "low: 90 mJ", "line 15, column 13, tank.low: needs more than the floor of 0.1 J; got 0.09 J"),
-        ("kind: port", "kind: paper, trip: 20 mJ", "line 15, column 27, tank.trip: needs less than the floor of 0.01 J; got 0.02 J"),
+        ("kind: port", "kind: paper, trip: 20 mJ", "line 15, column 27, tank.trip: needs less than the floor of 0.01 J (the default); got 0.02 J"),
         # actions, gains, what happens when
         ("50 %", "150 %", "line 16, column 28, actions.follow_velocity: expected one number, ≥ 0, ≤ 1; got '150 %' (too large)"),
         ("follow_velocity: 50 %", "posture_stiffness: -2", "line 16, column 30, actions.posture_stiffness: expected N m/rad, one number or a list of numbers, ≥ 0; got -2 (too small)"),
@@ -241,13 +241,17 @@ def test_without_a_rate_nothing_sampled_is_allowed() -> None:
         f"line 19, column 14, feedforward: {ONLY}",
         f"line 20, column 8, drags: {ONLY}",
     ]
-    only = "needs `control`: only a sampled tank has it"
     continuous = changed("control: {rate: 1000}\n", "", RIGID.replace("rigid", "impedance"))
     shaped = "shaped_stiffness: {ratio: 1}\n  shaped_inertia: {ratio: 1}\n"
     continuous = changed("target_inertia: {damping_ratio: 0.7}\n", shaped, continuous)
     assert mistakes(continuous + "tank: {trip: 1 mJ, power: 3, braking: 2}\n") == [
-        f"line 12, column {column}, tank.{name}: {only}"
-        for name, column in (("trip", 14), ("power", 27), ("braking", 39))
+        f"line 12, column {column}, tank.{name}: a tank of kind paper without `control` does not use it; "
+        f"{kinds} with `control` do; remove it"
+        for name, column, kinds in (
+            ("trip", 14, "port"),
+            ("power", 27, "port, paper"),
+            ("braking", 39, "time_domain"),
+        )
     ]
     assert parse_scenario(parse_scenario(continuous).to_yaml()).tank == TankSettings().completed("paper")
 

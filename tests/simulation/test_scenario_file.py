@@ -325,17 +325,17 @@ SHAPED = "shaped_stiffness: {ratio: 10}"
         (
             "tolerance",
             "tank: {initial: 0}\ntolerance",
-            "line 21, column 17, tank.initial: a tank started empty never moves the reference; got 0 J; needs more than the floor of 0.01 J",
+            "line 21, column 17, tank.initial: a tank started empty never moves the reference; got 0 J; needs more than the floor of 0.01 J (the default)",
         ),
         (
             "tolerance",
             "tank: {low: 5 mJ}\ntolerance",
-            "line 21, column 13, tank.low: needs more than the floor of 0.01 J; got 0.005 J",
+            "line 21, column 13, tank.low: needs more than the floor of 0.01 J (the default); got 0.005 J",
         ),
         (
             "tolerance",
             "tank: {cap: 0.1 J}\ntolerance",
-            "line 21, column 13, tank.cap: needs more than low + band, 0.1 J; got 0.1 J",
+            "line 21, column 13, tank.cap: needs at least the initial of 2 J (the default): what is above it is spilled; got 0.1 J",
         ),
         # time
         (

@@ -76,6 +76,10 @@ class AbstractTank(abc.ABC):
             Field("tank_braking", (), "N m s/rad", "α_max: most damping that the tank adds, if it adds any"),
         )
     )
+    uses: ClassVar[tuple[str, ...]]
+    """Settings that it goes by, beside its level at the start: `accounting` is `tank_signed`, the others go by name."""
+    gates: ClassVar[tuple[str, ...]] = ()
+    """Settings that only its valve goes by: they act where something is gated."""
     falls_back: ClassVar[bool] = False
     """Whether a level below `tank_trip` means that the loop is active."""
 
@@ -119,7 +123,9 @@ def booked(level: cs.SX, *, granted: cs.SX | float, flow: cs.SX | float, cap: cs
     granted, flow = cs.if_else(ok, granted, zero), cs.if_else(ok, flow, zero)
     drawn, refilled = cs.fmax(-flow, 0), cs.fmax(flow, 0)
     full = level - granted + flow
-    most = cs.fmax(cap, level - granted)  # what was above the cap before may stay; nothing may come to it
+    most = cs.fmax(
+        cap, level - granted
+    )  # what a fallback's rebasing put above the cap may stay; nothing may come to it
     spilled = cs.fmin(cs.fmax(full - most, 0), refilled)
     after = cs.if_else(spilled > 0, most, full)  # full − spilled, but not rounded to what came in
     return TankEntry(after, granted, drawn, refilled, spilled, 1 - ok)

@@ -22,6 +22,7 @@ class PortTank(AbstractTank):
     does, S + V̂(q) ≥ 0 with the weight V̂ of its model, and Σw − (V̂ − V̂₀) ≤ S₀ + V̂₀ + T₀.
     """
 
+    uses: ClassVar[tuple[str, ...]] = ("floor", "low", "cap", "power", "trip", "accounting")
     falls_back: ClassVar[bool] = True
 
     def settle(self, level: cs.SX, flows: PeriodFlows, g: SimpleNamespace) -> TankEntry:
@@ -55,6 +56,8 @@ class PaperTank(AbstractTank):
     credits energy that nobody dissipated.
     """
 
+    uses: ClassVar[tuple[str, ...]] = ("fill", "floor", "low", "cap", "power", "accounting")
+
     def settle(self, level: cs.SX, flows: PeriodFlows, g: SimpleNamespace) -> TankEntry:
         """Return the entry of α P_D Δt."""
         ok = finite(level, flows.claimed_loss)
@@ -86,6 +89,9 @@ class TimeDomainTank(AbstractTank):
     same period, the damping −E / (Δt |φ̇|²) that would pay the debt within it, at most α_max. It gates no
     reference: what that gives shows at the port a moment later.
     """
+
+    uses: ClassVar[tuple[str, ...]] = ("cap", "braking")
+    gates: ClassVar[tuple[str, ...]] = ("floor", "low")
 
     def settle(self, level: cs.SX, flows: PeriodFlows, g: SimpleNamespace) -> TankEntry:
         """Return the entry of −w."""
@@ -121,6 +127,8 @@ class VariableStiffnessTank(AbstractTank):
     off. A change of the stiffness is free, and the reference is not gated.
     """
 
+    uses: ClassVar[tuple[str, ...]] = ("fill", "floor", "low", "cap")
+
     def settle(self, level: cs.SX, flows: PeriodFlows, g: SimpleNamespace) -> TankEntry:
         """Return the entry of α ẋᵀD_xẋ Δt and of the work on the variable part."""
         ok = finite(level, flows.claimed_cartesian_loss, flows.variable_spring_work)
@@ -142,3 +150,12 @@ class VariableStiffnessTank(AbstractTank):
     def stiffness_share(self, level: cs.SX, g: SimpleNamespace) -> cs.SX:
         """Return β(T)."""
         return self.valve(level, g)
+
+
+TANKS: dict[str, type[AbstractTank]] = {
+    "port": PortTank,
+    "paper": PaperTank,
+    "time_domain": TimeDomainTank,
+    "variable_stiffness": VariableStiffnessTank,
+}
+"""By the name of their kind in a scenario."""

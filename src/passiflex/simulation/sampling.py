@@ -25,8 +25,7 @@ from passiflex.sampled.inner_loop import AbstractInnerLoop, PlainInnerLoop
 from passiflex.sampled.matched_loop import MatchedInnerLoop
 from passiflex.sampled.motors import UNLIMITED_TORQUE
 from passiflex.sampled.sensors import UNFILTERED
-from passiflex.sampled.tank import AbstractTank
-from passiflex.sampled.tanks import PaperTank, PortTank, TimeDomainTank, VariableStiffnessTank
+from passiflex.sampled.tanks import TANKS
 from passiflex.simulation.control_settings import Actions, Control, MotorSettings, SensorSettings
 from passiflex.simulation.gains import sized
 from passiflex.simulation.law_settings import ImpedanceSettings
@@ -38,12 +37,6 @@ from passiflex.simulation.tank_settings import TankSettings
 
 Array = NDArray[np.float64]
 
-TANKS: dict[str, type[AbstractTank]] = {
-    "port": PortTank,
-    "paper": PaperTank,
-    "time_domain": TimeDomainTank,
-    "variable_stiffness": VariableStiffnessTank,
-}
 EXTERNAL: dict[str, AbstractExternalTorque] = {
     "true": TrueTorque(),
     "measured": MeasuredWrench(),

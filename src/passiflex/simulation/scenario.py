@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 import yaml
-from pydantic import BeforeValidator, Field, ValidationInfo, field_validator
+from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
 
 from passiflex.simulation.control_settings import (
     Actions,
@@ -185,13 +185,12 @@ class Scenario(Section):
             raise Mistakes(
                 (("kind",), f"a tank of kind {tank.kind} needs `control`, a rate at which it runs")
             )
-        if not sampled and tank.only_sampled:
-            raise Mistakes(
-                *(((name,), "needs `control`: only a sampled tank has it") for name in tank.only_sampled)
-            )
         if "law" in info.data:
             tank.require(info.data["law"].gravity)
-        return tank.completed("port" if sampled else "paper")
+        tank = tank.completed("port" if sampled else "paper")
+        if "control" in info.data:
+            tank.require_used(sampled=sampled)
+        return tank
 
     @field_validator("control")
     @classmethod
@@ -206,6 +205,16 @@ class Scenario(Section):
         if found:
             raise Mistakes(*((("fallback", *place), text) for place, text in found))
         return control
+
+    @model_validator(mode="after")
+    def _tank_with_a_use(self) -> Self:
+        gating = self.control is None or self.actions or self.feedforward
+        try:
+            if self.tank is not None and not gating:
+                self.tank.require_gated()
+        except Mistakes as mistakes:
+            raise Mistakes(*((("tank", *place), text) for place, text in mistakes.entries)) from None
+        return self
 
     @field_validator(*WITH_CONTROL)
     @classmethod
