@@ -73,7 +73,7 @@ def default(field: FieldInfo) -> str:
     if field.is_required():
         return "required"
     if field.default_factory:
-        return "all defaults"
+        return "all defaults" if any(_is_section(p) for p in parts(field)) else "what fits"
     if isinstance(value, BaseModel) or value == ():
         return "none given"
     if isinstance(value, float):

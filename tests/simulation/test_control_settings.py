@@ -148,7 +148,7 @@ def test_the_resolved_scenario_loads_to_an_equal_one(text: str) -> None:
     assert Scenario(**{name: getattr(s, name) for name in Scenario.model_fields}) == s
 
 
-PERIODS = "with jitter at most 20 periods"
+PERIODS = "delay and jitter together are at most 20 periods"
 ONLY = "needs `control`: only a sampled run has it"
 
 
@@ -225,10 +225,43 @@ def test_noise_is_held_for_whole_periods_and_rows_need_not_fit_it(hold: str, sec
     assert noise.hold == seconds
 
 
-def test_noise_without_a_hold_is_held_for_a_millisecond_at_any_rate_that_divides_it() -> None:
-    s = parse_scenario(changed(", hold: 0.5 ms", ""))
+@pytest.mark.parametrize(
+    ("rate", "hold"), [("2 kHz", 1e-3), ("500 Hz", 2e-3), ("300 Hz", 1 / 300), ("1.6 kHz", 2 / 1600)]
+)
+def test_noise_without_a_hold_is_held_for_whole_periods_near_a_millisecond(rate: str, hold: float) -> None:
+    s = parse_scenario(changed(", hold: 0.5 ms", "").replace("2 kHz", rate).replace("0.75 ms", "0"))
     assert s.noise is not None
-    assert s.noise.hold == 1e-3
+    assert s.noise.hold == hold
+
+
+@pytest.mark.parametrize(
+    ("rate", "interval"),
+    [
+        (125, 8e-3),
+        (250, 4e-3),
+        (300, 2 / 300),
+        (500, 4e-3),
+        (333, 2 / 333),
+        (1000, 5e-3),
+        (4000, 5e-3),
+        (20, 0.05),
+    ],
+)
+def test_the_interval_that_is_left_out_fits_the_rate(rate: float, interval: float) -> None:
+    """The multiple of the period nearest to 5 ms; what was resolved loads again and says the same."""
+    s = parse_scenario(RIGID.replace("1000", str(rate)))
+    assert s.output_interval == interval
+    assert abs(s.output_interval * rate - round(s.output_interval * rate)) < 1e-9
+    assert parse_scenario(s.to_yaml()) == s
+
+
+def test_the_interval_that_is_left_out_fits_a_short_run_and_the_noise() -> None:
+    assert parse_scenario(RIGID.replace("duration: 1", "duration: 3.2 ms")).output_interval == 0.003
+    continuous = RIGID.replace("control: {rate: 1000}\n", "noise: {torque_variance: 1, hold: 3 ms}\n")
+    assert parse_scenario(continuous).output_interval == pytest.approx(6e-3, rel=1e-12)
+    assert mistakes(RIGID.replace("duration: 1", "duration: 0.2 ms")) == [
+        "line 1, column 1, output_interval: needs to be no longer than the duration, 0.0002 s; got 0.001 s (the default)"
+    ]
 
 
 def test_without_a_rate_nothing_sampled_is_allowed() -> None:

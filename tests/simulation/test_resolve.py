@@ -466,7 +466,7 @@ def test_static_gravity_refuses_joints_that_are_too_soft_for_its_fixed_point() -
     """Eight steps of a fixed point that contracts by 14 % leave 1e-7 of the weight; softer is refused."""
     message = refused(ValueRangeError, law={"gravity": "static", "shaped_stiffness": {"ratio": 0.03}})
     assert message.startswith(
-        "shaped_stiffness is too soft for gravity: static; got the weight's slope is 14% of K_e"
+        "shaped_stiffness is too soft for gravity: static, the default; got the weight's slope is 14% of K_e"
     )
     assert message.endswith(
         "needs at most 10%, so that its fixed point is found; try a stiffer shaped_stiffness, or gravity: motor"

@@ -359,9 +359,9 @@ SHAPED = "shaped_stiffness: {ratio: 10}"
             "line 17, column 12, forces[0].from: needs to be earlier than the end, 30 s; got 30 s",
         ),
         (
-            "1 ms",
-            "3 ms",
-            "line 1, column 1, output_interval: needs a whole multiple of noise.hold, 0.003 s; got 0.005 s",
+            "hold: 1 ms}\n",
+            "hold: 3 ms}\noutput_interval: 5 ms\n",
+            "line 20, column 18, output_interval: needs a whole multiple of noise.hold, 0.003 s; got 0.005 s",
         ),
         (
             "tolerance",

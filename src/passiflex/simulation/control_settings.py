@@ -88,8 +88,12 @@ class Control(Section):
     def _few_on_their_way(self) -> Self:
         periods = (self.delay + self.jitter) * self.rate
         if periods > MOST_PERIODS:
+            written = "delay" if "delay" in self.model_fields_set else "jitter"
             raise Mistakes(
-                (("delay",), f"with jitter at most {MOST_PERIODS} periods; got {periods:.4g} periods")
+                (
+                    (written,),
+                    f"delay and jitter together are at most {MOST_PERIODS} periods; got {periods:.4g} periods",
+                )
             )
         return self
 

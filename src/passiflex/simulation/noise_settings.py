@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Self
 
 from pydantic import Field
 
@@ -17,14 +17,25 @@ class Noise(Section):
         description="variance per joint, (N m)^2"
     )
     hold: Annotated[float, Quantity("s", above=0)] = Field(
-        default=0.001, description="time between two samples, s; with control a whole multiple of the period"
+        default=0.001,
+        description="time between two samples, s; with control a whole multiple of the period, "
+        "and the nearest one if left out",
     )
 
-    def require(self, rate: float) -> None:
-        """Raise Mistakes unless a sample is held for whole periods of this rate [Hz]."""
+    def fitted(self, rate: float) -> Self:
+        """Return the noise with a sample held for whole periods of this rate [Hz], the nearest if none was asked for.
+
+        Raises
+        ------
+        Mistakes
+            If a hold was asked for that is no multiple of the period.
+        """
+        if "hold" not in self.model_fields_set:
+            return self.model_copy(update={"hold": max(1, round(self.hold * rate)) / rate})
         if not is_multiple(self.hold * rate):
             needs = f"a whole multiple of the control period, {1 / rate:g} s: sensors are read once in it"
             raise Mistakes((("hold",), f"needs {needs}; got {self.hold:g} s"))
+        return self
 
 
 def is_multiple(ratio: float) -> bool:

@@ -183,7 +183,7 @@ def _refuse_soft(robot: FlexibleJointRobot, q: Array, model: dict[str, Array], K
     contraction = float(np.abs(np.linalg.eigvals(np.array(slopes).T / K_e[:, None])).max())
     if contraction > SLOWEST_CONTRACTION:
         raise ValueRangeError(
-            "shaped_stiffness is too soft for gravity: static",
+            "shaped_stiffness is too soft for gravity: static, the default",
             got=f"the weight's slope is {contraction:.0%} of K_e",
             needs=f"at most {SLOWEST_CONTRACTION:.0%}, so that its fixed point is found",
             try_="a stiffer shaped_stiffness, or gravity: motor",

@@ -21,8 +21,9 @@ from passiflex.simulation.control_settings import (
 )
 from passiflex.simulation.law_settings import ImpedanceSettings, RigidSettings
 from passiflex.simulation.model_errors import Deviations, ModelErrors
-from passiflex.simulation.noise_settings import Noise, is_multiple
+from passiflex.simulation.noise_settings import Noise
 from passiflex.simulation.quantity import Quantity, shown
+from passiflex.simulation.row_interval import fitting_interval, interval_mistake
 from passiflex.simulation.section import Mistakes, Section
 from passiflex.simulation.tank_settings import TankSettings
 
@@ -163,10 +164,10 @@ class Scenario(Section):
     )
     drags: tuple[Drag, ...] = Field(default=(), description="drags at the end effector, with control only")
     output_interval: Seconds = Field(
-        default=0.005,
+        default_factory=fitting_interval,
         validate_default=True,
         description="time between two rows of the result, s; with control a whole multiple of the period, "
-        "without it of noise.hold",
+        "without it of noise.hold; the one nearest to 0.005 s if left out",
     )
     tolerance: Annotated[float, Quantity("1", least=1e-13, most=1e-3)] = Field(
         default=1e-9, description="relative tolerance of the integrator"
@@ -239,7 +240,7 @@ class Scenario(Section):
     def _whole_periods(cls, noise: Noise | None, info: ValidationInfo) -> Noise | None:
         control = info.data.get("control")
         if noise is not None and control is not None:
-            noise.require(control.rate)
+            return noise.fitted(control.rate)
         return noise
 
     @field_validator("reference")
@@ -276,18 +277,8 @@ class Scenario(Section):
     @field_validator("output_interval")
     @classmethod
     def _whole_samples(cls, interval: float, info: ValidationInfo) -> float:
-        if interval > info.data.get("duration", float("inf")):
-            needs = f"needs to be no longer than the duration, {info.data['duration']:g} s"
-            raise ValueError(f"{needs}; got {interval:g} s")
-        noise, control = info.data.get("noise"), info.data.get("control", "in error")
-        if isinstance(control, Control):
-            step, name = 1 / control.rate, "the period"
-        elif noise is not None and control is None:
-            step, name = noise.hold, "noise.hold"
-        else:
-            return interval
-        if not is_multiple(interval / step):
-            raise ValueError(f"needs a whole multiple of {name}, {step:g} s; got {interval:g} s")
+        if mistake := interval_mistake(interval, info.data):
+            raise ValueError(mistake)
         return interval
 
     def to_yaml(self) -> str:
