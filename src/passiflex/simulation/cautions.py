@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from passiflex.simulation.problem import Problem
+from passiflex.simulation.turn_cautions import far_turns, large_moments
 
-CAUTIONS: tuple[Callable[[Problem], tuple[str, ...]], ...] = ()
+CAUTIONS: tuple[Callable[[Problem], tuple[str, ...]], ...] = (far_turns, large_moments)
 """Who is asked, in the order in which the lines are printed."""
 
 
