@@ -1,4 +1,4 @@
-"""The directive `scenario-table`: the entries of one section of a scenario file, read from its model.
+"""The directives `scenario-table`, the entries of one section of a scenario file, and `tank-table`, read from the code.
 
 A table cannot differ from the package: key, what may be written, default and meaning are those of
 `passiflex.simulation.scenario`.
@@ -17,8 +17,11 @@ from pydantic.fields import FieldInfo
 from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
+from passiflex.control.tank import EnergyTank
+from passiflex.sampled.tanks import TANKS
 from passiflex.simulation.quantity import Quantity
 from passiflex.simulation.scenario import Scenario
+from passiflex.simulation.tank_settings import TankSettings
 
 COLUMNS = (("key", 22), ("write", 30), ("default", 12), ("meaning", 36))
 
@@ -111,6 +114,28 @@ class ScenarioTable(SphinxDirective):
         return [table]
 
 
+class TankTable(SphinxDirective):
+    """`tank-table::`, which kind of tank goes by which of its settings, read from the tanks."""
+
+    def run(self) -> list[nodes.Node]:
+        """Return the table."""
+        kinds = {"paper, in continuous time": EnergyTank} | dict(TANKS)
+        names = [n for n in TankSettings.model_fields if n not in ("kind", "initial")]
+        table, group = nodes.table(classes=["scenario"]), nodes.tgroup(cols=len(kinds) + 1)
+        group += [nodes.colspec(colwidth=1) for _ in range(len(kinds) + 1)]
+        head, body = nodes.thead(), nodes.tbody()
+        head += _row([nodes.Text(title) for title in ("setting", *kinds)])
+        for name in names:
+            body += _row([nodes.literal(text=name), *(nodes.Text(_used(t, name)) for t in kinds.values())])
+        group += [head, body]
+        table += group
+        return [table]
+
+
+def _used(tank: Any, name: str) -> str:
+    return "yes" if name in tank.uses else "yes (v)" if name in getattr(tank, "gates", ()) else "–"
+
+
 def _row(cells: list[nodes.Node]) -> nodes.row:
     row = nodes.row()
     for cell in cells:
@@ -121,4 +146,5 @@ def _row(cells: list[nodes.Node]) -> nodes.row:
 def setup(app: Sphinx) -> dict[str, bool]:
     """Register the directive."""
     app.add_directive("scenario-table", ScenarioTable)
+    app.add_directive("tank-table", TankTable)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
