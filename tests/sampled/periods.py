@@ -92,13 +92,16 @@ class Rig:
         law, (told, t) = self.controller.law, self.told.symbols("told")
         p = cs.SX.sym("p", sum(part.size for part in self.controller.parameters))
         views, rows = _split(self.controller.parameters, p), slice(0, law.task.size)
-        m, g, a, y = views.m, views.g, views.actions, _said(t)[0]
+        m, g, a, (y, wish) = views.m, views.g, views.actions, _said(t)
         stored = law.stored(y, m, g)
         phi, dphi = stored.phi, stored.dphi
         M, J = law.robot.arm.mass_matrix(y.q, m), law.robot.arm.jacobian(y.q, m)[rows, :]
         at_end = law.robot.arm.jacobian(phi, m)
         lead = tracking_wrench(M, J, t.damping, t.velocity[rows], t.acceleration[rows], g.regularisation, a)
-        pull = posture_spring(M, J, phi, dphi, g.regularisation, a)
+        motors = m.motor_inertia if isinstance(law, RigidImpedanceLaw) else g.shaped_inertia
+        error = law.task.error(stored.pose, wish.pose)
+        moving = M + cs.diag(motors)
+        pull = posture_spring(moving, at_end[rows, :], error, phi, dphi, g.regularisation, a)
         torque = at_end.T @ t.wrench + at_end[rows, :].T @ lead + pull
         return cs.Function("actions", [told, p], [cs.densify(torque)], {"cse": True})
 

@@ -212,7 +212,7 @@ def test_the_power_limit_is_per_time_that_passed(make: Callable[[], Rig]) -> Non
 @each_rig
 @pytest.mark.parametrize("name", ACTIONS)
 def test_a_reference_that_is_held_back_leads_by_its_share(make: Callable[[], Rig], name: str) -> None:
-    """γ (D_x ẋ_d + Λ ẍ_d): what follows the reference goes as slowly as it; wrench and posture know nothing of γ."""
+    """γ (D_x ẋ_d + Λ ẍ_d): what follows the reference goes as slowly as it; posture sees the one in force."""
     rig, (on, row) = make(), ACTIONS[name]
     told, home = slack(rig, 5, 1, rig.numbers(5), **row)
     power = 0.2 * rig.law_says(told[0], rig.numbers(5)).potential / PERIOD
@@ -220,9 +220,10 @@ def test_a_reference_that_is_held_back_leads_by_its_share(make: Callable[[], Rig
     out = rig.run(rig.start(home, FULL), told, p)
     share = out.entry_reference_share[0]
     assert 0.2 < share < 0.8
-    whole = np.array(rig.actions(told[0], p)).ravel()
+    granted = governed(rig, told[0], out, 0)
+    whole = np.array(rig.actions(granted, p)).ravel()
     lead = np.array(rig.actions(rig.but(told[0], wrench=np.zeros(6)), rig.numbers(5, leads))).ravel()
-    expected = rig.law_says(governed(rig, told[0], out, 0), p, whole - (1 - share) * lead).command
+    expected = rig.law_says(granted, p, whole - (1 - share) * lead).command
     np.testing.assert_allclose(out.command[0], expected, rtol=0, atol=ROUND * np.abs(expected).max() * 10)
 
 
