@@ -163,6 +163,7 @@ ONLY = "needs `control`: only a sampled run has it"
         ("rate: 2 kHz, ", "", "line 12, column 10, control.rate: missing: control rate, Hz"),
         ("0.75 ms", "-1 ms", "line 12, column 31, control.delay: expected s, one number, ≥ 0; got '-1 ms' (too small)"),
         ("0.75 ms", "31 ms", f"line 12, column 31, control.delay: {PERIODS}; got 62 periods"),
+        ("delay: 0.75 ms", "jitter: 12 ms", f"line 12, column 32, control.jitter: {PERIODS}; got 24 periods"),
         ("0.75 ms", "9 ms, jitter: 2 ms", f"line 12, column 31, control.delay: {PERIODS}; got 22 periods"),
         ("0.75 ms", "0, jitter: -1", "line 12, column 42, control.jitter: expected s, one number, ≥ 0; got -1 (too small)"),
         ("0.75 ms", "0, missed: 95 %", "line 12, column 42, control.missed: expected one number, ≥ 0, ≤ 0.9; got '95 %' (too large)"),
