@@ -223,7 +223,7 @@ def test_with_an_empty_tank_nothing_is_done_for_nothing() -> None:
 
 def test_a_stiffness_that_nobody_can_pay_is_held_back() -> None:
     """20 mJ where 1 J is asked for: K̂ rises until they are spent, and the spring never holds more than was paid."""
-    tank = {"initial": FLOOR + 0.02, "floor": FLOOR, "low": 0.11, "cap": 0.121, "band": 0.005}
+    tank = {"initial": FLOOR + 0.02, "floor": FLOOR, "low": 0.11, "cap": 0.121}
     run = ran(**merged(PUSHED, change(600, 0.3) | {"tank": tank}))
     assert run["stiffness_share"].min() < 0.1
     reached = run["held_stiffness"][:, 0, 0]
