@@ -20,6 +20,10 @@ N, PERIOD = 2, 1e-3
 SENSORS = Sensors(N)
 SIZES = (N, N, N, N, N, 6, N)
 OFF = {
+    "torque_scale": np.zeros(N),
+    "torque_offset": np.zeros(N),
+    "link_offset": np.zeros(N),
+    "motor_offset": np.zeros(N),
     "link_resolution": 0.0,
     "motor_resolution": 0.0,
     "velocity_differences": 0.0,
@@ -65,7 +69,10 @@ def sensors(length: int) -> cs.Function:
 
 
 def read(
-    truth: np.ndarray, noise: np.ndarray | float = 0.0, elapsed: np.ndarray | float = PERIOD, **effects: float
+    truth: np.ndarray,
+    noise: np.ndarray | float = 0.0,
+    elapsed: np.ndarray | float = PERIOD,
+    **effects: float | np.ndarray,
 ) -> Measurement:
     """Return the readings of a sequence of measurements (length, 18), each (length, size)."""
     length = len(truth)

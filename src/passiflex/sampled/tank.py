@@ -76,6 +76,8 @@ class AbstractTank(abc.ABC):
             Field("tank_braking", (), "N m s/rad", "α_max: most damping that the tank adds, if it adds any"),
         )
     )
+    measures: ClassVar[bool] = False
+    """Whether the level follows from the measured port: what that may get wrong is then not granted."""
     falls_back: ClassVar[bool] = False
     """Whether a level below `tank_trip` means that the loop is active."""
 

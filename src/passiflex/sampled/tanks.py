@@ -22,6 +22,7 @@ class PortTank(AbstractTank):
     does, S + V̂(q) ≥ 0 with the weight V̂ of its model, and Σw − (V̂ − V̂₀) ≤ S₀ + V̂₀ + T₀.
     """
 
+    measures: ClassVar[bool] = True
     falls_back: ClassVar[bool] = True
 
     def settle(self, level: cs.SX, flows: PeriodFlows, g: SimpleNamespace) -> TankEntry:
@@ -86,6 +87,8 @@ class TimeDomainTank(AbstractTank):
     same period, the damping −E / (Δt |φ̇|²) that would pay the debt within it, at most α_max. It gates no
     reference: what that gives shows at the port a moment later.
     """
+
+    measures: ClassVar[bool] = True
 
     def settle(self, level: cs.SX, flows: PeriodFlows, g: SimpleNamespace) -> TankEntry:
         """Return the entry of −w."""

@@ -81,13 +81,15 @@ def altered(
     numbers = replaced(parts, numbers, fallback, "fallback")
     numbers = replaced(parts, numbers, true, "plant")
     numbers = replaced(parts, numbers, {"period": period}, "inner")
+    noise = problem.noise
+    if noise is not None:
+        noise = noise._replace(hold=_held(noise.hold, s.period) * period)
+        numbers = replaced(parts, numbers, {"noise_hold": noise.hold}, "errors")
     changed = dataclasses.replace(
         problem,
         gains=law.layout.pack(own),
         plant=law.robot.layout.pack(true),
-        noise=problem.noise._replace(hold=_held(problem.noise.hold, s.period) * period)
-        if problem.noise
-        else None,
+        noise=noise,
         output_interval=float(data["output_interval"]),
         configuration=_text(data),
         sampling=dataclasses.replace(
