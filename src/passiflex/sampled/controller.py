@@ -17,7 +17,7 @@ from passiflex.sampled.actions import action_layout, posture_spring, tracking_wr
 from passiflex.sampled.external import AbstractExternalTorque, Known, TrueTorque
 from passiflex.sampled.governor import govern_pose, govern_stiffness
 from passiflex.sampled.inner_loop import AbstractInnerLoop, PlainInnerLoop
-from passiflex.sampled.measurement_bound import booked_bound, bound_state, error_layout
+from passiflex.sampled.measurement_bound import booked_bound, bound_state, error_layout, sure, sure_state
 from passiflex.sampled.signals import ControlParameters, LedgerEntry, Step, Wish
 from passiflex.sampled.tank import AbstractTank, PeriodFlows, TankEntry, added, finite, unchanged
 
@@ -100,6 +100,7 @@ class SampledController:
                 )
             )
             + bound_state(n)
+            + sure_state(n)
             + self.external.state(n)
             + self.inner.state(n)
         )
@@ -142,9 +143,11 @@ class SampledController:
         bound = booked_bound(y, elapsed, first, s, p.errors)
         doubt = bound.total if self.tank is not None and self.tank.measures else cs.SX(0)
 
+        is_sure = cs.logic_or(first, settled.level - bound.total >= p.tank.tank_floor)
+
         # Fall back in the period in which it shows beyond what the sensors explain, and keep T + S.
         falls = self.tank is not None and self.tank.falls_back
-        short = settled.level + bound.explained < p.tank.tank_trip
+        short = settled.level + bound.lowered < p.tank.tank_trip + s.sure_measurement_bound
         overdrawn = cs.logic_and(short, s.latched < 1) if falls else cs.SX(0)
         latched = cs.fmax(s.latched, overdrawn)
         g = _chosen(latched, p.fallback, p.g)
@@ -195,6 +198,7 @@ class SampledController:
             "faults": s.faults + cs.fmin(tank.fault, 1),
             "lost_time": 0,
             **bound.state,
+            **sure(is_sure, y.q, s, bound.state),
         }
         own = Layout(self.state.fields[: len(values)])
         after = cs.vertcat(own.stack(values), observed, seen)

@@ -80,7 +80,8 @@ def altered(
     numbers = replaced(parts, s.numbers, own, "gains")
     numbers = replaced(parts, numbers, fallback, "fallback")
     numbers = replaced(parts, numbers, true, "plant")
-    numbers = replaced(parts, numbers, {"period": period}, "inner")
+    for part in ("inner", "errors"):
+        numbers = replaced(parts, numbers, {"period": period}, part)
     noise = problem.noise
     if noise is not None:
         noise = noise._replace(hold=_held(noise.hold, s.period) * period)

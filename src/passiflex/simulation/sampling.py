@@ -31,6 +31,7 @@ from passiflex.sampled.tanks import PaperTank, PortTank, TimeDomainTank, Variabl
 from passiflex.simulation.control_settings import Actions, Control, MotorSettings, SensorSettings
 from passiflex.simulation.gains import sized
 from passiflex.simulation.law_settings import ImpedanceSettings
+from passiflex.simulation.noise_settings import Noise
 from passiflex.simulation.posture import Posture
 from passiflex.simulation.problem import GainChange, Interval, Sampling
 from passiflex.simulation.sampled_loop import SampledLoop
@@ -113,7 +114,7 @@ def sampling(
                 "acceleration_gain": ACCELERATION_GAIN,
             }
         ),
-        parts.errors.pack(_errors(sensors, robot, scenario)),
+        parts.errors.pack(_errors(control, sensors, scenario.noise, robot)),
         parts.sensors.pack(_sensors(sensors, robot)),
         parts.limits.pack(_limits(motors, robot)),
     ]
@@ -222,9 +223,10 @@ def _sensors(sensors: SensorSettings, robot: FlexibleJointRobot) -> dict[str, Ar
     return numbers
 
 
-def _errors(sensors: SensorSettings, robot: FlexibleJointRobot, scenario: Scenario) -> dict[str, ArrayLike]:
+def _errors(
+    control: Control, sensors: SensorSettings, noise: Noise | None, robot: FlexibleJointRobot
+) -> dict[str, Array | float]:
     """Return how large the errors of the sensors are, which the law's books know; their signs they do not."""
-    noise = scenario.noise
     return {
         "torque_scale": np.abs(_joints(robot, "sensors.torque_scale", sensors.torque_scale)),
         "torque_offset": np.abs(_joints(robot, "sensors.torque_offset", sensors.torque_offset)),
@@ -234,6 +236,7 @@ def _errors(sensors: SensorSettings, robot: FlexibleJointRobot, scenario: Scenar
         "noise_hold": noise.hold if noise else 0.0,
         "noise_credit": 0.0,  # of the loop: see `noise_credit.charged`
         "bend": BEND,
+        "period": 1 / control.rate,
     }
 
 
