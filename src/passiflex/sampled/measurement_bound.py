@@ -80,6 +80,7 @@ def bound_state(n: int) -> Layout:
     return Layout(
         (
             Field("measurement_bound", (), "J", "E, most that Σ w may be short of the energy given so far"),
+            Field("read_time", (), "s", "when the sensors were last read"),
             Field("charged_energy", (), "J", "its part for the mean credit of noise that lasts"),
             Field("walk", (), "J^2", "variance of what noise and encoders make of Σ w"),
             Field("bent", (), "J^2", "variance of the bends, as if they were random"),
@@ -125,6 +126,7 @@ def booked_bound(
     withheld = s.withheld_energy + cs.sum1(work) - cs.dot(y.tau_a + s.last_tau_a, dq) / 2
     start, torque = cs.if_else(first, y.q, s.first_q), cs.norm_1(raw)
     state = {
+        "read_time": cs.if_else(first, 0, s.read_time + elapsed),
         "charged_energy": s.charged_energy + cs.if_else(first, 0, e.noise_credit * elapsed),
         "walk": s.walk + cs.if_else(first, 0, random),
         "bent": s.bent + bend**2,
