@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from passiflex.simulation.book_cautions import book_cautions
 from passiflex.simulation.problem import Problem
 
-CAUTIONS: tuple[Callable[[Problem], tuple[str, ...]], ...] = ()
+CAUTIONS: tuple[Callable[[Problem], tuple[str, ...]], ...] = (book_cautions,)
 """Who is asked, in the order in which the lines are printed."""
 
 
