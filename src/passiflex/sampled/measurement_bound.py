@@ -201,6 +201,6 @@ def _between(
     bend_q = cs.fmax(cs.fabs(dq - ratio * s.step_q) - e.link_resolution * (1 + ratio), 0)
     seen = cs.fmax(cs.fabs(dtau) - noise * cs.sqrt(2), 0)
     bend = e.bend * (cs.dot(bend_tau, cs.fabs(dq)) + cs.dot(seen, bend_q))
-    curve = (cs.dot(s.step_tau_a, dq) - cs.dot(dtau, s.step_q)) / 12
+    curve = e.bend / 3 * (cs.dot(s.step_tau_a, dq) - cs.dot(dtau, s.step_q))
     late = GAP * e.period
     return bend, cs.if_else(s.step_time < late, curve, 0), elapsed > late
