@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from passiflex.control.law import ImpedanceLaw
 from passiflex.simulation.altered import altered, replaced
 from passiflex.simulation.linear_loop import LinearLoop
-from passiflex.simulation.noise_credit import POSTURES, REACH, noise_credit, unbiased
+from passiflex.simulation.noise_credit import POSTURES, REACH, noise_credit
 from passiflex.simulation.problem import Problem
 from passiflex.simulation.sampled_loop import SampledLoop
 
@@ -49,7 +49,7 @@ def _lighter(problem: Problem, power: float) -> str:
         for ratio in (r for r in HEAVIER if (r > own).all()):
             changed = altered(problem, gains={"shaped_inertia": ratio * model["motor_inertia"]})
             left = POSTURES * noise_credit(changed)
-            if left <= power / 2 and LinearLoop(unbiased(changed)).radius() < 1:
+            if left <= power / 2 and LinearLoop(changed).radius() < 1:
                 return f"try shaped_inertia: {{ratio: {ratio:g}}}, with {left:.2g} W"
     return "try less noise at low frequencies, or a fuller tank (tank.initial)"
 
@@ -81,7 +81,7 @@ def _offset(problem: Problem) -> tuple[str, ...]:
 def _moved_by(problem: Problem, offset: Array) -> Array:
     """Return |q − q₀| (n,) at the end of the run for the worst signs of an offset (n,), by the linear loop."""
     assert problem.sampling is not None
-    loop = LinearLoop(unbiased(problem))
+    loop = LinearLoop(problem)
     driven = loop.driven()
     answer, power = driven.G, driven.A
     for _ in range(max(1, int(np.log2(problem.duration / problem.sampling.period)))):

@@ -44,15 +44,6 @@ def mean_credit(loop: DrivenLoop, joints: int, variance: float, lasting: int) ->
     return -variance * float(np.trace((answer + before)[:joints])) / (2 * lasting)
 
 
-def unbiased(problem: Problem) -> Problem:
-    """Return the sampled problem without the constant offsets of its sensors, which no linear loop can have."""
-    s = problem.sampling
-    assert s is not None
-    none = dict.fromkeys(("torque_offset", "link_offset", "motor_offset"), np.zeros(problem.law.robot.n))
-    numbers = replaced(SampledLoop(s.controller).parameters, s.numbers, none, "sensors")
-    return dataclasses.replace(problem, sampling=dataclasses.replace(s, numbers=numbers))
-
-
 def noise_credit(problem: Problem) -> float:
     """Return the mean power [W] that the noise of a sampled problem credits its tank with, ≥ 0.
 
@@ -65,7 +56,7 @@ def noise_credit(problem: Problem) -> float:
     lasting = round(noise.hold / s.period)
     if lasting <= 1:
         return 0.0
-    loop = LinearLoop(unbiased(problem))
+    loop = LinearLoop(problem)
     later: list[Mapping[str, ArrayLike]] = [{"stiffness": c.stiffness, "damping": c.damping} for c in s.gains]
     powers = [
         mean_credit(loop.driven(gains=gains), loop.n, noise.variance, lasting) / s.period
