@@ -209,3 +209,17 @@ def test_what_lowers_a_level_counts_from_when_it_last_was_sure() -> None:
     expected = SIGMAS * walk + 0.3 * np.abs(q[200:] - q[199]).sum(axis=1)
     np.testing.assert_allclose(out.lowered[200:], expected, rtol=1e-9, atol=1e-12)
     assert out.lowered[201] < 0.1 * out.total[201]
+
+
+@settings(deadline=None, max_examples=20)
+@given(SEEDS)
+def test_noise_that_outlasts_the_run_is_an_offset(seed: int) -> None:
+    """From its first moment on: a draw of σ on each joint errs by nᵀ (q − q₀), within 5 σ of what is booked."""
+    q, _ = walked(seed)
+    n = np.random.default_rng(seed).normal(0, 0.4, N)
+    error = -(q - q[0]) @ n
+    out = booked(q, np.tile(n, (len(q), 1)), noise_deviation=0.4, noise_hold=100.0)
+    assert (error <= out.total + 1e-12).all()
+    five = SIGMAS * 0.4 * np.linalg.norm((q - q[0])[:100], axis=1)
+    assert (out.total[:100] >= 0.99 * five).all()
+    assert (out.total[1:100] <= 1.3 * five[1:]).all()

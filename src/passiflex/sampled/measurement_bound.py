@@ -147,9 +147,11 @@ def booked_bound(
     least = 1 - cs.mmax(e.torque_scale)  # a torque may be read this share of its size
     constant = _constant(y.q - start, r.joint_work, r.first_torque + torque, e)
     hidden = r.unread_energy + CURVED * cs.fmax(r.curved_energy, 0) + r.charged_energy
-    total = (constant + SIGMAS * cs.sqrt(r.walk + r.bent) + hidden + cs.fmax(r.withheld_energy, 0)) / least
+    begun = e.noise_deviation**2 * cs.if_else(e.noise_hold < GAP * e.period, 0, cs.sumsqr(y.q - r.slow_q))
+    random = SIGMAS * cs.sqrt(r.walk + begun + r.bent)
+    total = (constant + random + hidden + cs.fmax(r.withheld_energy, 0)) / least
     constant = _constant(y.q - s.sure_q, r.joint_work - s.sure_joint_work, s.sure_torque + torque, e)
-    walked = SIGMAS * cs.sqrt(cs.fmax(r.walk - s.sure_walk, 0))
+    walked = SIGMAS * cs.sqrt(cs.fmax(r.walk - s.sure_walk, 0) + 2 * begun)
     lowered = (constant + walked + cs.fmax(s.sure_withheld_energy - r.withheld_energy, 0)) / least
     return Bound(total, lowered, {"measurement_bound": total} | state)
 
