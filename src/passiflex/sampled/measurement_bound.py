@@ -19,6 +19,7 @@ what the noise explains: how far torque and way may have left their chords. Whic
 
 from __future__ import annotations
 
+import math
 from types import SimpleNamespace
 from typing import Any, NamedTuple
 
@@ -40,6 +41,8 @@ GAP = 1.5
 """Periods from which on readings have a gap between them."""
 SHORTEST = 1e-9
 """A time [s] below which nothing lasts."""
+SMALLEST = 1e-200
+"""A variance [J²] that is none."""
 
 
 class Bound(NamedTuple):
@@ -148,10 +151,10 @@ def booked_bound(
     constant = _constant(y.q - start, r.joint_work, r.first_torque + torque, e)
     hidden = r.unread_energy + CURVED * cs.fmax(r.curved_energy, 0) + r.charged_energy
     begun = e.noise_deviation**2 * cs.if_else(e.noise_hold < GAP * e.period, 0, cs.sumsqr(y.q - r.slow_q))
-    random = SIGMAS * cs.sqrt(r.walk + begun + r.bent)
+    random = SIGMAS * _root(r.walk + begun + r.bent)
     total = (constant + random + hidden + cs.fmax(r.withheld_energy, 0)) / least
     constant = _constant(y.q - s.sure_q, r.joint_work - s.sure_joint_work, s.sure_torque + torque, e)
-    walked = SIGMAS * cs.sqrt(cs.fmax(r.walk - s.sure_walk, 0) + 2 * begun)
+    walked = SIGMAS * _root(cs.fmax(r.walk - s.sure_walk, 0) + 2 * begun)
     lowered = (constant + walked + cs.fmax(s.sure_withheld_energy - r.withheld_energy, 0)) / least
     return Bound(total, lowered, {"measurement_bound": total} | state)
 
@@ -167,6 +170,11 @@ def _constant(moved: cs.SX, work: cs.SX, torques: cs.SX, e: SimpleNamespace) -> 
     """Return what offset, scale and the encoders' steps at both ends are worth over a displacement [J]."""
     steps = e.link_resolution / 2 * torques
     return cs.dot(e.torque_offset, cs.fabs(moved)) + cs.dot(e.torque_scale, cs.fabs(work)) + steps
+
+
+def _root(variance: cs.SX) -> cs.SX:
+    """Return the square root, with a slope at 0 that is finite."""
+    return cs.sqrt(cs.fmax(variance, SMALLEST)) - math.sqrt(SMALLEST)
 
 
 def _before_low_pass(tau: cs.SX, last: cs.SX, elapsed: cs.SX, bandwidth: cs.SX) -> cs.SX:
