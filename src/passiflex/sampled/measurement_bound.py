@@ -33,8 +33,8 @@ SIGMAS = 5.0
 """Standard deviations that are booked: in a random walk exceeded once in some 10⁵ runs, at any time of them."""
 EXPLAINED = 2.0
 """Standard deviations of a difference of readings that noise explains."""
-BEND = 0.25
-"""Three times the 1/12 of a parabola, as the next step may bend as much again."""
+BEND = 1 / 3
+"""Four times the 1/12 of a parabola, as the next step may bend as much again, and more where a vibration grows."""
 CURVED = 1.5
 """Vibrations of four periods per cycle curve that much more than parabolas do."""
 GAP = 1.5
@@ -211,6 +211,6 @@ def _between(
     bend_q = cs.fmax(cs.fabs(dq - ratio * s.step_q) - e.link_resolution * (1 + ratio), 0)
     seen = cs.fmax(cs.fabs(dtau) - noise * cs.sqrt(2), 0)
     bend = e.bend * (cs.dot(bend_tau, cs.fabs(dq)) + cs.dot(seen, bend_q))
-    curve = e.bend / 3 * (cs.dot(s.step_tau_a, dq) - cs.dot(dtau, s.step_q))
+    curve = e.bend / 4 * (cs.dot(s.step_tau_a, dq) - cs.dot(dtau, s.step_q))
     late = GAP * e.period
     return bend, cs.if_else(s.step_time < late, curve, 0), elapsed > late
