@@ -16,7 +16,7 @@ import passiflex
 from cli.shell import Shell
 from passiflex.passivity import audit
 from passiflex.simulation import Run, parse_scenario, simulate
-from worlds import PLANAR
+from worlds import PLANAR, ran
 
 WRONG = """\
 name: wrong
@@ -172,6 +172,17 @@ def test_an_undecided_run_ends_with_2(shell: Shell, tmp_path: Path) -> None:
     assert result.status == 2
     assert "verdict: inconclusive" in result.out
     assert "remedy: the run ended early: the integrator gave up" in result.out
+
+
+def test_audit_prints_what_errors_of_the_sensors_may_hide(shell: Shell, tmp_path: Path) -> None:
+    """The bound at the end and its mean power, of a sampled run; nothing of it for a file of before."""
+    sampled = ran(noise={"torque_variance": 0.2, "hold": 0.001}, duration=0.3)
+    bound = sampled["measurement_bound"][-1]
+    said = " ".join(shell("audit", sampled.save(tmp_path / "run.nc")).out.split())
+    words = f"the tank may claim up to {bound:.3g} J too much by the end, {bound / 0.3:.2g} W on average"
+    assert f"errors of the sensors: {words}; nothing was granted on it" in said
+    older = Run(sampled.data.drop_vars("measurement_bound"))
+    assert "errors of the sensors" not in shell("audit", older.save(tmp_path / "old.nc")).out
 
 
 def test_files_that_cannot_be_audited_end_with_2(shell: Shell, tmp_path: Path) -> None:

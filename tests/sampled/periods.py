@@ -19,6 +19,7 @@ from passiflex.robots.arm import EndEffectorPose
 from passiflex.robots.flexible import FlexibleJointRobot
 from passiflex.sampled.actions import action_layout, posture_spring, tracking_wrench
 from passiflex.sampled.controller import SampledController
+from passiflex.sampled.sensors import UNFILTERED
 from passiflex.sampled.signals import ControlParameters, LedgerEntry, Wish
 from passiflex.sampled.tank import TankEntry
 from passiflex.sampled.tanks import PortTank
@@ -125,7 +126,8 @@ class Rig:
             tank={f"tank_{name}": value for name, value in (LEVELS | levels).items()},
             actions={f.name: np.broadcast_to(shares[f.name], f.shape) for f in action_layout(self.n)},
             observer={"bandwidth": 50.0},
-            inner={f.name: 0.5 for f in parts[-1]},
+            inner={f.name: 0.5 for f in parts[-2]},
+            errors={f.name: np.zeros(f.shape) for f in parts[-1]} | {"torque_bandwidth": UNFILTERED},
         )
         return np.concatenate([part.pack(value) for part, value in zip(parts, values, strict=True)])
 

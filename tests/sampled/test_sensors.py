@@ -20,6 +20,10 @@ N, PERIOD = 2, 1e-3
 SENSORS = Sensors(N)
 SIZES = (N, N, N, N, N, 6, N)
 OFF = {
+    "torque_scale": np.zeros(N),
+    "torque_offset": np.zeros(N),
+    "link_offset": np.zeros(N),
+    "motor_offset": np.zeros(N),
     "link_resolution": 0.0,
     "motor_resolution": 0.0,
     "velocity_differences": 0.0,
@@ -65,7 +69,10 @@ def sensors(length: int) -> cs.Function:
 
 
 def read(
-    truth: np.ndarray, noise: np.ndarray | float = 0.0, elapsed: np.ndarray | float = PERIOD, **effects: float
+    truth: np.ndarray,
+    noise: np.ndarray | float = 0.0,
+    elapsed: np.ndarray | float = PERIOD,
+    **effects: float | np.ndarray,
 ) -> Measurement:
     """Return the readings of a sequence of measurements (length, 18), each (length, size)."""
     length = len(truth)
@@ -240,3 +247,40 @@ def test_velocities_feel_the_resolution() -> None:
         # Each reading is off by half a step at most.
         lag = np.abs(rate[1:] - np.diff(getattr(true, name), axis=0) / PERIOD)
         assert lag.max() <= step / PERIOD * (1 + 1e-9)
+
+
+def test_scale_and_offset_come_before_noise_bandwidth_and_resolution() -> None:
+    """(1 + s) τ_a + o + n joint by joint, from the first sample on; an offset of an angle comes before its steps."""
+    rng = np.random.default_rng(6)
+    truth = moving(rng, PERIOD * np.arange(60), degree=2)
+    scale, offset, noise = rng.uniform(-0.1, 0.1, N), rng.normal(size=N), rng.normal(size=(60, N))
+    true = split(truth)
+    measured = read(truth, noise, torque_scale=scale, torque_offset=offset)
+    np.testing.assert_allclose(
+        measured.tau_a, (1 + scale) * true.tau_a + offset + noise, rtol=1e-14, atol=1e-14
+    )
+    slow = read(truth, noise, torque_scale=scale, torque_offset=offset, torque_bandwidth=80.0)
+    moved = (1 + scale) * true.tau_a + offset
+    np.testing.assert_array_equal(
+        slow.tau_a, read(_with_torque(truth, moved), noise, torque_bandwidth=80.0).tau_a
+    )
+    link, motor, step = np.array([0.3, -0.2]), np.array([-0.1, 0.05]), 1e-3
+    coarse = read(truth, link_offset=link, motor_offset=motor, link_resolution=step)
+    np.testing.assert_array_equal(coarse.theta, true.theta + motor)
+    np.testing.assert_allclose(coarse.q, step * np.round((true.q + link) / step), rtol=0, atol=1e-12)
+
+
+def test_constant_offsets_of_angles_leave_velocities() -> None:
+    truth = moving(np.random.default_rng(7), PERIOD * np.arange(40), degree=2)
+    plain, moved = (
+        read(truth, velocity_differences=1.0, link_offset=o * np.ones(N), motor_offset=-o * np.ones(N))
+        for o in (0.0, 0.25)
+    )
+    for name in ("dq", "dtheta"):
+        np.testing.assert_allclose(getattr(moved, name), getattr(plain, name), rtol=0, atol=1e-11)
+
+
+def _with_torque(truth: np.ndarray, tau_a: np.ndarray) -> np.ndarray:
+    out = truth.copy()
+    out[:, 4 * N : 5 * N] = tau_a
+    return out

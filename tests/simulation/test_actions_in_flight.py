@@ -234,20 +234,21 @@ def test_a_stiffness_that_nobody_can_pay_is_held_back() -> None:
 
 
 def assert_never_paid_below(run: Run, floor: float) -> None:
-    """After a grant the level is never below the floor; only the port can take it there."""
+    """After a grant the level, less its bound, is never below the floor; only the port can take it there."""
     granting = np.append(False, np.diff(run["granted_energy"]) > 0)
     assert granting.any()
-    assert run["tank_energy"][granting].min() >= floor - 1e-15
+    sure = run["tank_energy"] - run["measurement_bound"]
+    assert sure[granting].min() >= floor - 1e-15
 
 
 @pytest.mark.parametrize("initial", [0.11, 0.15, 0.3, 1.0])
 def test_a_poor_tank_pays_down_to_its_floor_and_no_further(initial: float) -> None:
-    """Everything at once: the valve is that of the level, motors stay inside their limits, and the books close."""
+    """Everything at once: the valve is that of the level less its bound, motors stay in their limits, books close."""
     run = ran(**EVERYTHING, **CHANGED, tank={"initial": initial, "floor": FLOOR, "low": LOW})
     assert not run.failure
     assert not run["latched"].any()
     assert_never_paid_below(run, FLOOR)
-    level = run["tank_energy"]
+    level = run["tank_energy"] - run["measurement_bound"]
     expected = [float(smoothstep((T - FLOOR) / (LOW - FLOOR))) for T in level]
     np.testing.assert_allclose(run["valve"], expected, rtol=0, atol=1e-12)
     assert (np.abs(run["tau_m"]) <= [100, 50]).all()

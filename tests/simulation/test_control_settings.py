@@ -181,6 +181,9 @@ ONLY = "needs `control`: only a sampled run has it"
         ("0.01 deg", "0, velocity: diff", "line 13, column 41, sensors.velocity: unknown word 'diff'; try 'differences'"),
         ("link_resolution: 0.01 deg", "velocity_filter: 0", "line 13, column 28, sensors.velocity_filter: expected Hz, one number, > 0; got 0 (too small)"),
         ("link_resolution: 0.01 deg", "torque_bandwith: 3", "line 13, column 11, sensors.torque_bandwith: unknown name; try 'torque_bandwidth'"),
+        ("link_resolution: 0.01 deg", "torque_scale: 60 %", "line 13, column 25, sensors.torque_scale: expected one number or a list of numbers, ≥ -0.5, ≤ 0.5; got '60 %' (too large)"),
+        ("link_resolution: 0.01 deg", "torque_offset: 3 N", "line 13, column 26, sensors.torque_offset: expected N m, one number or a list of numbers; got '3 N' (N)"),
+        ("link_resolution: 0.01 deg", "link_offset: inf", "line 13, column 24, sensors.link_offset: expected rad, one number or a list of numbers; got 'inf' (not finite)"),
         ("torque_limit: robot", "torque_limit: 30", "line 14, column 24, motors.torque_limit: unknown word 30; one of 'none', 'robot'"),
         ("torque_limit: robot", "torque_rate_limit: 0", "line 14, column 29, motors.torque_rate_limit: expected N m/s, one number, > 0; got 0 (too small)"),
         ("torque_limit: robot", "coulomb_friction: [1, -1]", "line 14, column 28, motors.coulomb_friction: expected N m, one number or a list of numbers, ≥ 0; got [1, -1] (too small)"),
@@ -306,6 +309,7 @@ def test_mistakes_with_the_rigid_law(old: str, new: str, line: str) -> None:
     [
         ("torque_limit: robot", "coulomb_friction: [1, 2, 3]", "motors.coulomb_friction does not fit robot 'planar2r'; got 3 numbers; needs one number or 2"),
         ("torque_limit: robot", "viscous_friction: [1]", None),
+        ("link_resolution: 0.01 deg", "torque_offset: [1, 2, 3]", "sensors.torque_offset does not fit robot 'planar2r'; got 3 numbers; needs one number or 2"),
         ("torque_limit: robot", "viscous_friction: [1, 2, 3]", "motors.viscous_friction does not fit robot 'planar2r'; got 3 numbers; needs one number or 2"),
         ("follow_velocity: 50 %", "posture: [1, 2, 3]", "actions.posture does not fit robot 'planar2r'; got 3 angles; needs 2 angles in rad"),
         ("follow_velocity: 50 %", "posture_stiffness: [1, 2, 3]", "actions.posture_stiffness does not fit robot 'planar2r'; got 3 numbers; needs one number or 2"),

@@ -142,7 +142,7 @@ def test_only_an_overdrawn_port_tank_falls_back() -> None:
 
 
 def test_the_papers_gains_on_the_iiwa_are_caught_within_its_limits() -> None:
-    """Fig. 1's step at 0.3 s, from sensors as they are: latched within 0.2 s, 4 J too much, and the arm comes back."""
+    """Fig. 1's step at 0.3 s, from sensors as they are: latched within 0.2 s, 2 J too much, and the arm comes back."""
     scenario = VARIANTS["paper_port"].change(shipped_scenario("fig1_sampled"))
     step = scenario.reference[0].model_copy(update={"at": 0.3})
     run = simulate(scenario.model_copy(update={"reference": (step,), "forces": (), "duration": 6.0}))
@@ -153,8 +153,8 @@ def test_the_papers_gains_on_the_iiwa_are_caught_within_its_limits() -> None:
     assert (np.abs(run["tau_m"]) <= run["torque_limit"]).all()
     away = np.linalg.norm(run["position"] - run["governed_position"], axis=1)
     assert away[k:].max() < 0.2
-    assert away[-1] < 0.3 * away[k:].max()
-    assert 0 < audit(run).overdraft < 20
+    assert away[-1] < 0.4 * away[k:].max()
+    assert 0 < audit(run).overdraft < 4
 
 
 # The first line of defence

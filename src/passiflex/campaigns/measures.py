@@ -45,6 +45,11 @@ MEASURES = {
         "high",
         "most that the tank claims beyond what is there; in continuous time, error of the law's books",
     ),
+    "measurement_bound": Measure(
+        "J",
+        "high",
+        "at the end, most that the tank may claim beyond what is there; not finite without control",
+    ),
     "integration_error": Measure("J", "high", "largest residual of the links' balance"),
     **{name: Measure("J", "high", f"at the end, {text}") for name, text in ENERGIES.items()},
     "tank_energy_end": Measure("J", "low", "level of the tank at the end"),
@@ -78,7 +83,7 @@ SIGNALS = (
     "external_power", "motor_power", "joint_power", "joint_loss_power", "friction_power",
     "tank_energy", "law_storage", "measured_port_energy", "spilled_energy",
     "compensated_energy", "shaped_kinetic_energy", "shaped_spring_energy", "cartesian_spring_energy",
-    "gravity_storage", "governed_time", "latched",
+    "gravity_storage", "governed_time", "latched", "read_time", "measurement_bound",
 )  # fmt: skip
 """What is recorded of a sampled run for it."""
 
@@ -96,6 +101,7 @@ def measures(problem: Problem, window: StepWindow | None, run: Signals) -> dict[
         "overdraft": result.overdraft,
         "decided_at": result.time,
         "claimed_beyond_true": result.books_error,
+        "measurement_bound": run["measurement_bound"][-1] if run.sampled else math.nan,
         "integration_error": result.integration_error,
         **{name: run[name][-1] for name in ENERGIES},
         "tank_energy_end": run["tank_energy"][-1] if run.has_tank else math.nan,

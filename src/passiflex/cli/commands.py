@@ -183,6 +183,12 @@ def _print_control(run: Run) -> None:
         console.print(f"the law fell back at {run.time[latched.argmax()]:.4g} s and held the pose it was in")
     if run["faults"][-1] > 0:
         console.print(f"{run['faults'][-1]:.0f} measurements were not finite, and changed nothing")
+    if "measurement_bound" in run.data and run.time[-1] > 0:
+        bound = run["measurement_bound"][-1]
+        console.print(
+            f"errors of the sensors: the tank may claim up to {bound:.3g} J too much by the end, "
+            f"{bound / run.time[-1]:.2g} W on average; nothing was granted on it"
+        )
 
 
 def _refuse_target(scenario: Path, out: Path) -> None:

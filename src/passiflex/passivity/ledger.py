@@ -14,6 +14,9 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+AT_ONCE = 1e-7
+"""Two instants closer than this are one [s], after millions of periods."""
+
 
 class Signals(Protocol):
     """What the books are read from: a `Run`, or the recording of one in lanes."""
@@ -177,8 +180,23 @@ def port_tank(run: Signals) -> Array:
 
 
 def overclaimed(run: Signals) -> Array:
-    """Return by how much the level that the tank claims exceeds what is there, T − T_port [J]."""
-    return run["tank_energy"] * run.has_tank - port_tank(run)
+    """Return by how much the level that the tank claims exceeds what is there, T − T_port [J].
+
+    A sampled law claims a level when it reads its sensors. In a row of a period that it missed, what it claimed at
+    the last recorded reading stands.
+    """
+    beyond = run["tank_energy"] * run.has_tank - port_tank(run)
+    return beyond[_last_reading(run)] if run.sampled else beyond
+
+
+def _last_reading(run: Signals) -> NDArray[np.intp]:
+    """Return for each row the last row up to it at which the law read its sensors; files of before say it of all."""
+    rows = np.arange(len(run.time))
+    try:
+        read = run["read_time"]
+    except KeyError:
+        return rows
+    return np.maximum.accumulate(np.where(run.time - read < AT_ONCE, rows, 0))
 
 
 def initial_tank(run: Signals) -> float:

@@ -17,6 +17,7 @@ from passiflex.sampled.actions import action_layout, posture_spring, tracking_wr
 from passiflex.sampled.external import AbstractExternalTorque, Known, TrueTorque
 from passiflex.sampled.governor import govern_pose, govern_stiffness
 from passiflex.sampled.inner_loop import AbstractInnerLoop, PlainInnerLoop
+from passiflex.sampled.measurement_bound import booked_bound, bound_state, error_layout, sure, sure_state
 from passiflex.sampled.signals import ControlParameters, LedgerEntry, Step, Wish
 from passiflex.sampled.tank import AbstractTank, PeriodFlows, TankEntry, added, finite, unchanged
 
@@ -57,7 +58,8 @@ class SampledController:
         robot, gains = self.law.robot, self.law.layout
         observer = Layout((Field("bandwidth", (), "rad/s", "of the external torque's estimator"),))
         actions = action_layout(robot.n)
-        return robot.layout, gains, gains, AbstractTank.layout, actions, observer, AbstractInnerLoop.layout
+        tank, inner, errors = AbstractTank.layout, AbstractInnerLoop.layout, error_layout(robot.n)
+        return robot.layout, gains, gains, tank, actions, observer, inner, errors
 
     @cached_property
     def state(self) -> Layout:
@@ -97,6 +99,8 @@ class SampledController:
                     ),
                 )
             )
+            + bound_state(n)
+            + sure_state(n)
             + self.external.state(n)
             + self.inner.state(n)
         )
@@ -136,9 +140,15 @@ class SampledController:
         )
         settled = self.tank.settle(s.tank_energy, flows, p.tank) if self.tank else unchanged(s.tank_energy)
 
-        # Fall back in the period in which it shows, and keep T + S.
+        bound = booked_bound(y, elapsed, first, s, p.errors)
+        doubt = bound.total if self.tank is not None and self.tank.measures else cs.SX(0)
+
+        is_sure = cs.logic_or(first, settled.level - bound.total >= p.tank.tank_floor)
+
+        # Fall back in the period in which it shows beyond what the sensors explain, and keep T + S.
         falls = self.tank is not None and self.tank.falls_back
-        overdrawn = cs.logic_and(settled.level < p.tank.tank_trip, s.latched < 1) if falls else cs.SX(0)
+        short = settled.level + bound.lowered < p.tank.tank_trip + s.sure_measurement_bound
+        overdrawn = cs.logic_and(short, s.latched < 1) if falls else cs.SX(0)
         latched = cs.fmax(s.latched, overdrawn)
         g = _chosen(latched, p.fallback, p.g)
         now = self.law.stored(y, p.m, g)
@@ -148,8 +158,10 @@ class SampledController:
         rebased, lowest = cs.if_else(overdrawn, storage - restored, 0), settled.level
         settled = settled._replace(level=settled.level + rebased)
 
-        granted = self._grant(now, held, held_stiffness, wish, latched, settled.level, elapsed, p)
-        valve = (1 - latched) * self.tank.valve(granted.entry.level, p.tank) if self.tank else cs.SX(1)
+        granted = self._grant(now, held, held_stiffness, wish, latched, settled.level, doubt, elapsed, p)
+        valve = (
+            (1 - latched) * self.tank.valve(granted.entry.level - doubt, p.tank) if self.tank else cs.SX(1)
+        )
         g.stiffness, g.damping = granted.stiffness, cs.if_else(latched, p.fallback.damping, wish.damping)
         torque = valve * self._actions(y, now, wish, granted, g, p)
         if self.tank:
@@ -185,6 +197,8 @@ class SampledController:
             "governed_time": s.governed_time + cs.if_else(held_back, elapsed, 0),
             "faults": s.faults + cs.fmin(tank.fault, 1),
             "lost_time": 0,
+            **bound.state,
+            **sure(is_sure, y.q, s, bound.state),
         }
         own = Layout(self.state.fields[: len(values)])
         after = cs.vertcat(own.stack(values), observed, seen)
@@ -198,6 +212,7 @@ class SampledController:
             stiffness_share=granted.stiffness_share,
             valve=valve,
             latched=latched,
+            bound=bound.total,
             fault=1 - ok,
         )
         safe = command._replace(tau_m=cs.if_else(ok, command.tau_m, s.last_command))
@@ -214,23 +229,24 @@ class SampledController:
         wish: Wish,
         latched: cs.SX,
         level: cs.SX,
+        doubt: cs.SX,
         elapsed: cs.SX,
         p: ControlParameters,
     ) -> _Granted:
-        """Return the reference as far as the tank pays for it; a law that has fallen back holds its own."""
+        """Return the reference as far as the tank surely pays for it; a law that has fallen back holds its own."""
         one = cs.SX(1)
         if self.tank is None:
             stored = self._potential(now, wish.pose, wish.stiffness)
             cost = stored - self._potential(now, held, held_stiffness)
             return _Granted(wish.pose, wish.stiffness, one, one, cost, unchanged(level))
         task, tank = self.law.task, self.tank
-        share = tank.stiffness_share(level, p.tank)
+        share = tank.stiffness_share(level - doubt, p.tank)
         wanted = cs.if_else(
             share < 1, p.g.stiffness + share * (wish.stiffness - p.g.stiffness), wish.stiffness
         )
         wanted = cs.if_else(latched, held_stiffness, wanted)
         signed = p.tank.tank_signed
-        budget = tank.budget(level, elapsed, p.tank)
+        budget = tank.budget(level - doubt, elapsed, p.tank)
         stiffness = govern_stiffness(task, now.pose, held, held_stiffness, wanted, budget, signed)
         first = tank.pay(level, stiffness.cost, p.tank)
         budget = cs.fmax(budget - first.granted, 0)

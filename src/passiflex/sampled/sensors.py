@@ -1,4 +1,4 @@
-"""What a robot's sensors make of the truth: resolution, differences, bandwidth, noise."""
+"""What a robot's sensors make of the truth: scale, offset, noise, bandwidth, resolution, differences."""
 
 from __future__ import annotations
 
@@ -42,10 +42,11 @@ class Reading(NamedTuple):
 
 @dataclass(frozen=True)
 class Sensors:
-    """The sensors of one robot, in this order: noise, bandwidth, resolution; velocities come last.
+    """The sensors of one robot, in this order: scale, offset, noise, bandwidth, resolution; velocities come last.
 
-    All numbers are parameters: 0 switches a resolution off, `UNFILTERED` a bandwidth, and
-    `velocity_differences` 0 gives the true velocities. Nothing here knows what the law does.
+    All numbers are parameters: 0 switches a scale error, an offset or a resolution off, `UNFILTERED` a
+    bandwidth, and `velocity_differences` 0 gives the true velocities. Scale and offset stay what they are
+    for the whole run. Nothing here knows what the law does.
     """
 
     n: int
@@ -53,8 +54,13 @@ class Sensors:
     @property
     def layout(self) -> Layout:
         """Return the parameters."""
+        n = self.n
         return Layout(
             (
+                Field("torque_scale", (n,), "1", "τ_a is read 1 + this times as large"),
+                Field("torque_offset", (n,), "N m", "and this much higher"),
+                Field("link_offset", (n,), "rad", "q is read this much higher"),
+                Field("motor_offset", (n,), "rad", "θ is read this much higher"),
                 Field("link_resolution", (), "rad", "of q"),
                 Field("motor_resolution", (), "rad", "of θ"),
                 Field("velocity_differences", (), "1", "1: q̇, θ̇ are differences of readings; 0: true"),
@@ -85,10 +91,11 @@ class Sensors:
     ) -> Reading:
         """Return the reading of the truth, `elapsed` seconds after the last one."""
         first = s.started < 1
-        noisy = truth.tau_a + torque_noise
+        noisy = (1 + g.torque_scale) * truth.tau_a + g.torque_offset + torque_noise
         tau_a = cs.if_else(first, noisy, low_pass(s.read_tau_a, noisy, g.torque_bandwidth, elapsed))
         F_e = cs.if_else(first, truth.F_e, low_pass(s.read_wrench, truth.F_e, g.wrench_bandwidth, elapsed))
-        q, theta = quantised(truth.q, g.link_resolution), quantised(truth.theta, g.motor_resolution)
+        q = quantised(truth.q + g.link_offset, g.link_resolution)
+        theta = quantised(truth.theta + g.motor_offset, g.motor_resolution)
 
         def velocity(true: cs.SX, now: cs.SX, last: cs.SX, filtered: cs.SX) -> tuple[cs.SX, cs.SX]:
             rate = cs.if_else(first, 0, difference(last, now, elapsed))

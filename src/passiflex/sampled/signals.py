@@ -45,6 +45,7 @@ class LedgerEntry(NamedTuple):
     reference_share, stiffness_share: γ of the governor, 1 if nothing was held back.
     valve: β in this period.
     latched: 1 if the law has fallen back.
+    bound: E, most that Σw may be short of the energy given to the links so far.
     fault: 1 if the measurement was not finite: state and command are then those of the period before.
     """
 
@@ -56,6 +57,7 @@ class LedgerEntry(NamedTuple):
     stiffness_share: cs.SX
     valve: cs.SX
     latched: cs.SX
+    bound: cs.SX
     fault: cs.SX
 
 
@@ -80,6 +82,7 @@ class ControlParameters(NamedTuple):
     actions: `action_layout`.
     observer: `bandwidth` of the external torque's estimator.
     inner: `AbstractInnerLoop.layout`.
+    errors: `error_layout`, what the sensors may get wrong.
     """
 
     m: SimpleNamespace
@@ -89,3 +92,4 @@ class ControlParameters(NamedTuple):
     actions: SimpleNamespace
     observer: SimpleNamespace
     inner: SimpleNamespace
+    errors: SimpleNamespace

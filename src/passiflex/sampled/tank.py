@@ -80,6 +80,8 @@ class AbstractTank(abc.ABC):
     """Settings that it goes by, beside its level at the start: `accounting` is `tank_signed`, the others go by name."""
     gates: ClassVar[tuple[str, ...]] = ()
     """Settings that only its valve goes by: they act where something is gated."""
+    measures: ClassVar[bool] = False
+    """Whether the level follows from the measured port: what that may get wrong is then not granted."""
     falls_back: ClassVar[bool] = False
     """Whether a level below `tank_trip` means that the loop is active."""
 

@@ -23,6 +23,7 @@ class PortTank(AbstractTank):
     """
 
     uses: ClassVar[tuple[str, ...]] = ("floor", "low", "cap", "power", "trip", "accounting")
+    measures: ClassVar[bool] = True
     falls_back: ClassVar[bool] = True
 
     def settle(self, level: cs.SX, flows: PeriodFlows, g: SimpleNamespace) -> TankEntry:
@@ -92,6 +93,7 @@ class TimeDomainTank(AbstractTank):
 
     uses: ClassVar[tuple[str, ...]] = ("cap", "braking")
     gates: ClassVar[tuple[str, ...]] = ("floor", "low")
+    measures: ClassVar[bool] = True
 
     def settle(self, level: cs.SX, flows: PeriodFlows, g: SimpleNamespace) -> TankEntry:
         """Return the entry of −w."""

@@ -80,14 +80,17 @@ def altered(
     numbers = replaced(parts, s.numbers, own, "gains")
     numbers = replaced(parts, numbers, fallback, "fallback")
     numbers = replaced(parts, numbers, true, "plant")
-    numbers = replaced(parts, numbers, {"period": period}, "inner")
+    for part in ("inner", "errors"):
+        numbers = replaced(parts, numbers, {"period": period}, part)
+    noise = problem.noise
+    if noise is not None:
+        noise = noise._replace(hold=_held(noise.hold, s.period) * period)
+        numbers = replaced(parts, numbers, {"noise_hold": noise.hold}, "errors")
     changed = dataclasses.replace(
         problem,
         gains=law.layout.pack(own),
         plant=law.robot.layout.pack(true),
-        noise=problem.noise._replace(hold=_held(problem.noise.hold, s.period) * period)
-        if problem.noise
-        else None,
+        noise=noise,
         output_interval=float(data["output_interval"]),
         configuration=_text(data),
         sampling=dataclasses.replace(

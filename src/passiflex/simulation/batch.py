@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from passiflex.errors import NameUnknownError, SimulationError
 from passiflex.native import Change, LaneFunctions, LaneInputs, LaneLoop, find_compiler
 from passiflex.simulation.compiled import CompiledSampledLoop, compiled_sampled_loop, structure
+from passiflex.simulation.noise_credit import charged
 from passiflex.simulation.problem import Problem
 from passiflex.simulation.recorded import reported, sample_parts
 from passiflex.simulation.rows import Chance, Told, orders
@@ -164,7 +165,7 @@ def _advance(
     assert s is not None
     every = round(problems[0].output_interval / s.period)
     columns, shapes = _columns(lanes, compiled.loop, keep)
-    numbers = [p.sampling for p in filled if p.sampling is not None]
+    numbers = [p.sampling for p in map(charged, filled) if p.sampling is not None]
     p_plant = np.stack([n.plant for n in numbers], axis=1)
     p_control = np.stack([n.numbers for n in numbers], axis=1)
     state = lanes.start([start(p, compiled) for p in filled])

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from passiflex.simulation.book_cautions import book_cautions
 from passiflex.simulation.problem import Problem
 from passiflex.simulation.turn_cautions import far_turns, large_moments
 
-CAUTIONS: tuple[Callable[[Problem], tuple[str, ...]], ...] = (far_turns, large_moments)
+CAUTIONS: tuple[Callable[[Problem], tuple[str, ...]], ...] = (far_turns, large_moments, book_cautions)
 """Who is asked, in the order in which the lines are printed."""
 
 

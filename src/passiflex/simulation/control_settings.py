@@ -99,8 +99,24 @@ class Control(Section):
 
 
 class SensorSettings(Section):
-    """What the sensors make of the truth; without it they tell the truth."""
+    """What the sensors make of the truth; without it they tell the truth.
 
+    Offsets and scale stay what they are for the whole run. The controller is not corrected for them: its
+    books know how large they may be, not their sign.
+    """
+
+    torque_offset: Annotated[float | Vector, Quantity("N m", PerJoint)] = Field(
+        default=0.0, description="τ_a is read this much too high, one number for all joints or one each, N m"
+    )
+    torque_scale: Annotated[float | Vector, Quantity("1", PerJoint, least=-0.5, most=0.5)] = Field(
+        default=0.0, description="τ_a is read 1 + this times as large, one number or one each"
+    )
+    link_offset: Annotated[float | Vector, Quantity("rad", PerJoint)] = Field(
+        default=0.0, description="q is read this much too high, one number or one each, rad"
+    )
+    motor_offset: Annotated[float | Vector, Quantity("rad", PerJoint)] = Field(
+        default=0.0, description="θ is read this much too high, one number or one each, rad"
+    )
     link_resolution: Angle = Field(default=0.0, description="resolution of q, rad; 0 for none")
     motor_resolution: Angle = Field(default=0.0, description="resolution of θ, rad; 0 for none")
     velocity: Literal["true", "differences"] = Field(

@@ -24,13 +24,16 @@ Array = NDArray[np.float64]
 DRIFT = 1e-5
 """An eigenvalue this close to 1 belongs to a self-motion that nothing holds or nothing damps."""
 IDEAL = {
+    "torque_offset": 0.0,
+    "link_offset": 0.0,
+    "motor_offset": 0.0,
     "link_resolution": 0.0,
     "motor_resolution": 0.0,
     "torque_limit": UNLIMITED_TORQUE,
     "torque_rate_limit": UNLIMITED_TORQUE,
     "coulomb_friction": 0.0,
 }
-"""What has no linear approximation is left out."""
+"""What has no linear approximation is left out, and constants."""
 REMEMBERED = (
     "read_q", "read_theta", "read_dq", "read_dtheta", "read_tau_a", "read_wrench",
     "observed_torque", "momentum", "known_torque",

@@ -11,6 +11,8 @@ INTERNAL = (
     "last_tau_a", "last_command", "running", "given_torque", "claimed_power", "claimed_cartesian_power",
     "variable_potential", "seen", "seen_theta", "seen_deflection", "seen_dq", "seen_ddq", "in_flight",
     "momentum", "known_torque", "observing", "lost_time",
+    "walk", "bent", "unread_energy", "curved_energy", "withheld_energy", "joint_work", "first_q", "first_torque",
+    "slow_q", "raw_tau_a", "step_q", "step_tau_a", "step_time",
 )  # fmt: skip
 """Memory of the controller that is of no interest to a reader, or is recorded under another name."""
 WISHED = ("desired_position", "desired_rotation")

@@ -31,6 +31,7 @@ class Parts(NamedTuple):
     actions: Layout
     observer: Layout
     inner: Layout
+    errors: Layout
     sensors: Layout
     limits: Layout
 
@@ -59,9 +60,10 @@ class SampledLoop:
     def parameters(self) -> Parts:
         """Return the layouts of everything that `control` is told."""
         n = self.controller.law.robot.n
-        model, gains, fallback, tank, actions, observer, inner = self.controller.parameters
+        model, gains, fallback, tank, actions, observer, inner, errors = self.controller.parameters
         plant, sensors, limits = self.plant.parameters, self.sensors.layout, limit_layout(n)
-        return Parts(plant, model, gains, fallback, tank, actions, observer, inner, sensors, limits)
+        own = model, gains, fallback, tank, actions, observer, inner, errors
+        return Parts(plant, *own, sensors, limits)
 
     @cached_property
     def memory(self) -> Layout:

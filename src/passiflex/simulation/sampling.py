@@ -23,12 +23,14 @@ from passiflex.sampled.external import (
 )
 from passiflex.sampled.inner_loop import AbstractInnerLoop, PlainInnerLoop
 from passiflex.sampled.matched_loop import MatchedInnerLoop
+from passiflex.sampled.measurement_bound import BEND
 from passiflex.sampled.motors import UNLIMITED_TORQUE
 from passiflex.sampled.sensors import UNFILTERED
 from passiflex.sampled.tanks import TANKS
 from passiflex.simulation.control_settings import Actions, Control, MotorSettings, SensorSettings
 from passiflex.simulation.gains import sized
 from passiflex.simulation.law_settings import ImpedanceSettings
+from passiflex.simulation.noise_settings import Noise
 from passiflex.simulation.posture import Posture
 from passiflex.simulation.problem import GainChange, Interval, Sampling
 from passiflex.simulation.sampled_loop import SampledLoop
@@ -105,7 +107,8 @@ def sampling(
                 "acceleration_gain": ACCELERATION_GAIN,
             }
         ),
-        parts.sensors.pack(_sensors(sensors)),
+        parts.errors.pack(_errors(control, sensors, scenario.noise, robot)),
+        parts.sensors.pack(_sensors(sensors, robot)),
         parts.limits.pack(_limits(motors, robot)),
     ]
     return Sampling(
@@ -199,14 +202,34 @@ def _actions(
     }
 
 
-def _sensors(sensors: SensorSettings) -> dict[str, float]:
-    return {
+def _sensors(sensors: SensorSettings, robot: FlexibleJointRobot) -> dict[str, Array | float]:
+    numbers: dict[str, Array | float] = {
         "link_resolution": sensors.link_resolution,
         "motor_resolution": sensors.motor_resolution,
         "velocity_differences": float(sensors.velocity == "differences"),
         "velocity_bandwidth": _pole(sensors.velocity_filter),
         "torque_bandwidth": _pole(sensors.torque_bandwidth),
         "wrench_bandwidth": _pole(sensors.wrench_bandwidth),
+    }
+    for name in ("torque_scale", "torque_offset", "link_offset", "motor_offset"):
+        numbers[name] = _joints(robot, f"sensors.{name}", getattr(sensors, name))
+    return numbers
+
+
+def _errors(
+    control: Control, sensors: SensorSettings, noise: Noise | None, robot: FlexibleJointRobot
+) -> dict[str, Array | float]:
+    """Return how large the errors of the sensors are, which the law's books know; their signs they do not."""
+    return {
+        "torque_scale": np.abs(_joints(robot, "sensors.torque_scale", sensors.torque_scale)),
+        "torque_offset": np.abs(_joints(robot, "sensors.torque_offset", sensors.torque_offset)),
+        "torque_bandwidth": _pole(sensors.torque_bandwidth),
+        "link_resolution": sensors.link_resolution,
+        "noise_deviation": math.sqrt(noise.torque_variance) if noise else 0.0,
+        "noise_hold": noise.hold if noise else 0.0,
+        "noise_credit": 0.0,  # of the loop: see `noise_credit.charged`
+        "bend": BEND,
+        "period": 1 / control.rate,
     }
 
 

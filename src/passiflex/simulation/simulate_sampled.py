@@ -12,6 +12,7 @@ from passiflex.native import LoopState, NativeFunction, fastest_pole
 from passiflex.native.fixed_step import STABILITY_LIMIT
 from passiflex.simulation.admissible import require_stable
 from passiflex.simulation.compiled import CompiledSampledLoop, compiled_sampled_loop
+from passiflex.simulation.noise_credit import charged
 from passiflex.simulation.plant import SURROUNDINGS
 from passiflex.simulation.problem import Problem
 from passiflex.simulation.recorded import reported, sample_parts
@@ -46,7 +47,7 @@ def simulate_sampled(problem: Problem) -> Run:
 def simulate_unchecked(problem: Problem) -> Run:
     """Return the run of a sampled problem, stable or not."""
     assert problem.sampling is not None
-    return _record(problem, compiled_sampled_loop(problem.sampling.controller))
+    return _record(charged(problem), compiled_sampled_loop(problem.sampling.controller))
 
 
 def start(problem: Problem, compiled: CompiledSampledLoop) -> LoopState:

@@ -1,0 +1,102 @@
+"""What errors of the sensors cost the books of a tank, said before the run: see `sampled.measurement_bound`."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+from numpy.typing import NDArray
+
+from passiflex.control.law import ImpedanceLaw
+from passiflex.simulation.altered import altered, replaced
+from passiflex.simulation.linear_loop import LinearLoop
+from passiflex.simulation.noise_credit import POSTURES, REACH, noise_credit
+from passiflex.simulation.problem import Problem
+from passiflex.simulation.sampled_loop import SampledLoop
+
+Array = NDArray[np.float64]
+
+HEAVIER = (0.3, 1.0)
+"""B_e/B that are tried against the credit of noise."""
+HELD = 20.0
+"""Stiffness [N m/rad] that is tried against a self-motion that an offset moves."""
+
+
+def book_cautions(problem: Problem) -> tuple[str, ...]:
+    """Return what noise, offset and missed periods leave of the tank's books, a line each, with remedies that help."""
+    s = problem.sampling
+    if s is None or s.controller.tank is None or not s.controller.tank.measures:
+        return ()
+    return (*_noise(problem), *_offset(problem), *_missed(problem))
+
+
+def _noise(problem: Problem) -> tuple[str, ...]:
+    power, tank = POSTURES * noise_credit(problem), problem.tank
+    if power * problem.duration <= tank.floor or problem.noise is None:
+        return ()
+    return (
+        f"torque noise that lasts {problem.noise.hold * 1e3:g} ms credits the tank with energy that nobody gave: "
+        f"{power:.2g} W are charged for it, {power * problem.duration:.2g} J in {problem.duration:g} s, where "
+        f"{tank.initial - tank.floor:.3g} J are above its floor; {_lighter(problem, power)}",
+    )
+
+
+def _lighter(problem: Problem, power: float) -> str:
+    """Return a shaped inertia that at least halves the credit, found by trying; or what else there is."""
+    law, model = problem.law, problem.law.robot.layout.unpack(problem.model)
+    if isinstance(law, ImpedanceLaw):
+        own = law.layout.unpack(problem.gains)["shaped_inertia"] / model["motor_inertia"]
+        for ratio in (r for r in HEAVIER if (r > own).all()):
+            changed = altered(problem, gains={"shaped_inertia": ratio * model["motor_inertia"]})
+            left = POSTURES * noise_credit(changed)
+            if left <= power / 2 and LinearLoop(changed).radius() < 1:
+                return f"try shaped_inertia: {{ratio: {ratio:g}}}, with {left:.2g} W"
+    return "try less noise at low frequencies, or a fuller tank (tank.initial)"
+
+
+def _offset(problem: Problem) -> tuple[str, ...]:
+    s = problem.sampling
+    assert s is not None
+    parts = SampledLoop(s.controller).parameters
+    start = sum(part.size for part in parts[: parts._fields.index("errors")])
+    offset = parts.errors.unpack(s.numbers[start : start + parts.errors.size])["torque_offset"]
+    given, floor = float(offset.sum()) * REACH, problem.tank.floor
+    if given <= floor:
+        return ()
+    text = (
+        f"an offset of the torque sensors of up to {offset.max():.2g} N m gives up to {given:.2g} J while the joints "
+        f"move by {REACH:g} rad, and the tank, whose floor holds {floor:g} J back, sees it too late; "
+        "try to zero the sensors before the start, or a floor above that (tank.floor)"
+    )
+    if problem.law.robot.n > problem.law.task.size and _moved_by(problem, offset).max() >= REACH:
+        held = {"posture_stiffness": np.full(problem.law.robot.n, HELD)}
+        numbers = replaced(parts, s.numbers, held, "actions")
+        changed = dataclasses.replace(problem, sampling=dataclasses.replace(s, numbers=numbers))
+        text += "; it also moves a self-motion that nothing holds"
+        if _moved_by(changed, offset).max() < REACH:
+            text += f" (actions.posture_stiffness: {HELD:g} N m/rad holds it while the valve is open)"
+    return (text,)
+
+
+def _moved_by(problem: Problem, offset: Array) -> Array:
+    """Return |q − q₀| (n,) at the end of the run for the worst signs of an offset (n,), by the linear loop."""
+    assert problem.sampling is not None
+    loop = LinearLoop(problem)
+    driven = loop.driven()
+    answer, power = driven.G, driven.A
+    for _ in range(max(1, int(np.log2(problem.duration / problem.sampling.period)))):
+        answer, power = answer + power @ answer, power @ power
+        if np.abs(answer[: loop.n]).max() * offset.max() > REACH:
+            break
+    moved: Array = np.abs(answer[: loop.n]) @ offset
+    return moved
+
+
+def _missed(problem: Problem) -> tuple[str, ...]:
+    s, noise = problem.sampling, problem.noise
+    if s is None or not s.missed or noise is None or not noise.variance:
+        return ()
+    return (
+        f"{s.missed:.0%} of the periods are missed while the torque sensors are noisy: what goes through the joints "
+        "between two readings is only bounded (measurement_bound of the run), and nothing is granted on it",
+    )
