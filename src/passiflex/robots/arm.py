@@ -146,6 +146,25 @@ class SerialArm:
         """Return ∇V(q) (n,) N m."""
         return self.bias_torque(q, cs.SX.zeros(self.n), m)
 
+    def kinetic_energy(self, q: cs.SX, dq: cs.SX, m: SimpleNamespace) -> cs.SX:
+        """Return ½ q̇ᵀ M(q) q̇ [J], link by link from their velocities, in half the operations that M takes."""
+        adam = self._algorithms(m)
+        spin, speed, origin, energy = cs.SX.zeros(3), cs.SX.zeros(3), cs.SX.zeros(3), cs.SX(0)
+        for i, joint in enumerate(self.chain.joints):
+            frame = adam.forward_kinematics(f"link_{i + 1}", cs.SX.eye(4), q).array
+            rotation, moved = frame[:3, :3], frame[:3, 3] - origin
+            own = (rotation @ cs.sparsify(cs.DM(joint.axis))) * dq[i]
+            speed, origin = speed + cs.cross(spin, moved), frame[:3, 3]
+            if joint.kind == "prismatic":
+                speed += own
+            else:
+                spin += own
+            at_com = speed + cs.cross(spin, rotation @ m.link_com[i, :].T)
+            x, y, z = cs.vertsplit(rotation.T @ spin)
+            products = cs.vertcat(x * x, 2 * x * y, 2 * x * z, y * y, 2 * y * z, z * z)
+            energy += m.link_mass[i] * cs.dot(at_com, at_com) + cs.dot(m.link_inertia[i, :].T, products)
+        return energy / 2
+
     def potential_energy(self, q: cs.SX, m: SimpleNamespace) -> cs.SX:
         """Return V(q) = −Σ mᵢ gᵀ rᵢ(q) [J], zero with all mass at the base's origin."""
         adam = self._algorithms(m)
