@@ -77,7 +77,7 @@ SIGNALS = (
     "external_energy", "motor_energy", "joint_energy", "joint_loss_energy", "friction_energy", "reference_energy",
     "external_power", "motor_power", "joint_power", "joint_loss_power", "friction_power",
     "tank_energy", "law_storage", "measured_port_energy", "spilled_energy",
-    "compensated_energy", "shaped_kinetic_energy", "shaped_spring_energy", "cartesian_spring_energy",
+    "carried_energy", "compensated_energy", "shaped_kinetic_energy", "shaped_spring_energy", "cartesian_spring_energy",
     "gravity_storage", "governed_time", "latched",
 )  # fmt: skip
 """What is recorded of a sampled run for it."""

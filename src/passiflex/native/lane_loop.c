@@ -3,6 +3,8 @@
  * The text before this one defines, for lanes, the generated functions and their sizes:
  *   PLANT(x, [command, surroundings], p) -> (dx, dquad)      CONTROL(x, c, row, p) -> (c, command, z)
  *   ROW(time, told, drawn) -> row                            TRUTH(x, command, surroundings, p) -> truth
+ *   WATCH(w, [time, 1 at a sample or 0 at a step], y, command in force, c, z, p) -> w, if N_M is not 0: it sees
+ *   what the watch of held_loop.c sees.
  * What is told to a lane changes at single periods (changes, in the order of periods: period, lane, and where
  * in told_values its numbers stand); drawn are the numbers that chance gives to each period. timing holds for
  * each period and lane the delay of the command and whether the controller runs. Each lane keeps its own line
@@ -15,13 +17,13 @@
 typedef struct {
     long long first, n_rows, steps, record_every, n_changes, n_kept;
     double period;
-    lanes *y, *c, *told, *z;
+    lanes *y, *c, *told, *z, *w;
     double *line, *longest;
     const long long* changes;
     const double* told_values;
     const lanes* drawn;
     const double* timing;
-    const lanes *p_plant, *p_control;
+    const lanes *p_plant, *p_control, *p_watch;
     const long long* kept;
     lanes* out;
     long long *completed, *whole;
@@ -33,7 +35,7 @@ enum { N_Y = N_X + N_Q, ENTRY = 1 + N_U, LINE = 1 + N_U + LONGEST_LINE * ENTRY,
 /* One lane's way through a period: where it is, and the equal steps to the next arrival. */
 typedef struct {
     double t, h, until;
-    long long left;
+    long long left, done;
     int arrived; /* at the end of the period */
 } lane_clock;
 
@@ -84,28 +86,44 @@ static void lane_plan(lane_clock* clock, const double* line, double period, doub
     clock->left = (long long)ceil((clock->until - clock->t) / longest * (1.0 - 1e-12));
     if (clock->left < 1) clock->left = 1;
     clock->h = (clock->until - clock->t) / clock->left;
+    clock->done = 0;
 }
 
-static void lane_period(const passiflex_lane_run* r, lanes* input)
+/* Let the watch see the lanes that are `moving`. */
+static void lane_look(const passiflex_lane_run* r, const lanes* held, lanes time, double sample, lane_bits moving)
+{
+#if N_M > 0
+    const lanes moment[2] = {time, all_lanes(sample)};
+    lanes next[N_M];
+    WATCH(r->w, moment, r->y, held, r->c, r->z, r->p_watch, next);
+    for (int i = 0; i < N_M; i++) r->w[i] = where(moving, next[i], r->w[i]);
+#else
+    (void)r, (void)held, (void)time, (void)sample, (void)moving;
+#endif
+}
+
+static void lane_period(const passiflex_lane_run* r, lanes* input, double start)
 {
     lane_clock clock[LANES];
     EACH_LANE
     {
-        clock[l] = (lane_clock){0.0, 0.0, 0.0, 0, 0};
+        clock[l] = (lane_clock){0.0, 0.0, 0.0, 0, 0, 0};
         lane_plan(&clock[l], r->line + l * LINE, r->period, r->longest[l]);
     }
     for (;;) {
-        lanes h = all_lanes(0.0);
+        lanes h = all_lanes(0.0), time = all_lanes(start);
         lane_bits moving = all_bits(0);
         int some = 0;
         EACH_LANE if (!clock[l].arrived)
         {
             LANE(h, l) = clock[l].h;
+            LANE(time, l) = start + (clock[l].t + (++clock[l].done) * clock[l].h);
             LANE(moving, l) = -1;
             some = 1;
         }
         if (!some) return;
         lane_step(r->y, input, r->p_plant, h, moving);
+        lane_look(r, input, time, 0.0, moving);
         EACH_LANE if (!clock[l].arrived && --clock[l].left == 0)
         {
             double* line = r->line + l * LINE;
@@ -146,6 +164,7 @@ LANE_EXPORT void passiflex_lane_loop(const passiflex_lane_run* r)
             if (timing[LANES + l] != 0.0) lane_send(r->line + l * LINE, command, l, timing[l]);
             lane_receive(r->line + l * LINE, input, l, 0.0, r->period);
         }
+        lane_look(r, input, time, 1.0, all_bits(-1));
         if (k % r->record_every == 0) {
             lanes* s = seen;
             memcpy(s, r->y, N_Y * sizeof(lanes)), s += N_Y;
@@ -159,7 +178,7 @@ LANE_EXPORT void passiflex_lane_loop(const passiflex_lane_run* r)
             EACH_LANE r->whole[l] += LANE(none, l) == 0.0;
         }
         if (k >= r->steps) break;
-        lane_period(r, input);
+        lane_period(r, input, (double)(r->first + k) * r->period);
         int alive = 0;
         EACH_LANE
         {

@@ -26,6 +26,8 @@ from passiflex.simulation.simulate_sampled import (
     simulate_unchecked,
     start,
 )
+from passiflex.simulation.unbooked import UNKNOWN, unbooked
+from passiflex.simulation.witness import Noted
 
 Array = NDArray[np.float64]
 T = TypeVar("T")
@@ -42,16 +44,18 @@ class Recording:
 
     Attributes
     ----------
-    signals: By name, arrays whose first axis is the row.
+    signals: By name, arrays whose first axis is the row; and what `Witness` noted, which has no such axis.
     time: Of the rows [s].
     failure: Why the run ended early; empty if it did not.
     has_tank: Whether its law has a tank.
+    unbooked: What the law's books do not know in it, in words.
     """
 
     signals: dict[str, Array]
     time: Array
     failure: str
     has_tank: bool
+    unbooked: str = UNKNOWN
     sampled: bool = True
 
     def __getitem__(self, name: str) -> Array:
@@ -127,7 +131,9 @@ def lane_loop(problem: Problem, width: int | None = None) -> LaneLoop:
     key = (structure(problem.sampling.controller), width)
     if key not in _lane_loops:
         loop = _compiled(problem).loop
-        functions = LaneFunctions(loop.plant.rhs, loop.control, loop.period.function, loop.outputs)
+        functions = LaneFunctions(
+            loop.plant.rhs, loop.control, loop.period.function, loop.outputs, loop.watch
+        )
         _lane_loops[key] = LaneLoop(functions, width)
     return _lane_loops[key]
 
@@ -150,7 +156,9 @@ def _alone(problem: Problem, keep: Sequence[str]) -> Recording:
     for name in keep:
         if name not in known:
             raise NameUnknownError("signal", name, known)
-    return Recording({name: run[name] for name in keep}, run.time, run.failure, run.has_tank)
+    extremes = [f.name for f in _compiled(problem).loop.witness.extremes]
+    signals = {name: run[name] for name in (*keep, *extremes)}
+    return Recording(signals, run.time, run.failure, run.has_tank, run.unbooked)
 
 
 def _advance(
@@ -167,6 +175,10 @@ def _advance(
     numbers = [p.sampling for p in filled if p.sampling is not None]
     p_plant = np.stack([n.plant for n in numbers], axis=1)
     p_control = np.stack([n.numbers for n in numbers], axis=1)
+    witness = compiled.loop.witness
+    p_watch = np.concatenate(
+        [p_control, np.stack([witness.numbers(p.law.robot, p.tank.initial) for p in filled], axis=1)]
+    )
     state = lanes.start([start(p, compiled) for p in filled])
     told = [orders(p, compiled.loop.period) for p in filled]
     chances = [Chance(p, compiled.loop.period) for p in filled]
@@ -189,6 +201,7 @@ def _advance(
             columns,
             every,
             last=first + count == samples,
+            p_watch=p_watch,
         )
         state = done.state
         begin = first // every
@@ -199,7 +212,15 @@ def _advance(
         if (ended < samples).all():
             break
     return [
-        _recording(p, values[lane], shapes, int(ended[lane]), int(whole[lane]), samples)
+        _recording(
+            p,
+            values[lane],
+            shapes,
+            int(ended[lane]),
+            int(whole[lane]),
+            samples,
+            witness.noted(state.watched[:, lane]),
+        )
         for lane, p in enumerate(problems)
     ]
 
@@ -241,6 +262,7 @@ def _recording(
     ended: int,
     whole: int,
     samples: int,
+    noted: Noted,
 ) -> Recording:
     """Return what was kept of one lane; energies may leave the finite numbers before states do."""
     s = problem.sampling
@@ -252,7 +274,7 @@ def _recording(
     }
     time = np.arange(count, dtype=np.float64) * (s.period * every)
     failure = "" if ended == samples else left_finite(ended * s.period)
-    return Recording(signals, time, failure, problem.law.has_tank)
+    return Recording(signals | noted.values, time, failure, problem.law.has_tank, unbooked(problem))
 
 
 def simulate_in_lane(problem: Problem) -> Run:
@@ -267,4 +289,6 @@ def simulate_in_lane(problem: Problem) -> Run:
         Rows(layout, np.hstack([recording[f.name].reshape(len(recording.time), f.size) for f in layout]))
         for layout in layouts
     ]
-    return assemble(problem, recording.time, rows, [], recording.failure)
+    extremes = loop.witness.extremes
+    noted = Noted(extremes, {f.name: recording[f.name] for f in extremes})
+    return assemble(problem, recording.time, rows, [], recording.failure, noted)

@@ -8,6 +8,7 @@ from types import SimpleNamespace
 from typing import NamedTuple
 
 import casadi as cs
+import numpy as np
 
 from passiflex.control.signals import Measurement
 from passiflex.layout import Field, Layout
@@ -18,6 +19,7 @@ from passiflex.sampled.sensors import Sensors
 from passiflex.sampled.signals import ControlParameters, Wish
 from passiflex.simulation.period_row import PeriodRow
 from passiflex.simulation.plant import PLANT_ENERGIES, SURROUNDINGS, Plant
+from passiflex.simulation.witness import Instant, Witness
 
 
 class Parts(NamedTuple):
@@ -40,7 +42,7 @@ class SampledLoop:
     """Plant and controller as functions of flat vectors, ready for code generation.
 
     `plant.rhs` is the plant; `control` is (x, c, row, p) → (c, command, signals), one period; `outputs` is
-    (x, command, surroundings, p) → what is true then; `period` makes the rows.
+    (x, command, surroundings, p) → what is true then; `period` makes the rows; `watch` is what `witness` notes.
     """
 
     controller: SampledController
@@ -125,6 +127,7 @@ class SampledLoop:
                 Field("motor_kinetic_energy", (), "J", "½ θ̇ᵀ B θ̇"),
                 Field("joint_spring_energy", (), "J", "½ (θ−q)ᵀ K (θ−q)"),
                 Field("potential_energy", (), "J", "V(q)"),
+                Field("carried_energy", (), "J", "V̂(q) of the law's model, where the links really are"),
             )
         ) + Layout(
             tuple(Field(f"{f.name}_power", (), "W", f"rate of {f.name}_energy") for f in PLANT_ENERGIES)
@@ -197,7 +200,8 @@ class SampledLoop:
         state, command = cs.SX.sym("x", 4 * robot.n), cs.SX.sym("command", robot.n)
         surroundings, s = SURROUNDINGS.symbols("s")
         p = cs.SX.sym("p", sum(part.size for part in self.parameters))
-        m, x = _views(self.parameters, p).plant, self.plant.view(state)
+        views, x = _views(self.parameters, p), self.plant.view(state)
+        m = views.plant
         torques = self.plant.torques(x, s, m)
         _, powers = self.plant.rhs(state, cs.vertcat(command, surroundings), p[: self.parameters.plant.size])
         pose, stretch = arm.pose(x.q, m), x.theta - x.q
@@ -211,11 +215,57 @@ class SampledLoop:
             "motor_kinetic_energy": cs.dot(x.dtheta, m.motor_inertia * x.dtheta) / 2,
             "joint_spring_energy": cs.dot(stretch, m.joint_stiffness * stretch) / 2,
             "potential_energy": arm.potential_energy(x.q, m),
+            "carried_energy": arm.potential_energy(x.q, views.model),
         }
         known = Layout(self.truth.fields[: len(values)]).stack(values)
         return cs.Function(
             "truth", [state, command, surroundings, p], [cs.densify(cs.vertcat(known, powers))], {"cse": True}
         )
+
+    @cached_property
+    def witness(self) -> Witness:
+        """Return what notes the extremes."""
+        return Witness.of(self.controller.law.robot, has_tank=self.controller.law.has_tank, motors=True)
+
+    @cached_property
+    def watch(self) -> cs.Function:
+        """Return (memory, [time, 1 at a sample or 0 at a step], (x, energies), command, c, signals, p) → memory.
+
+        p is that of `control`, then that of the witness.
+        """
+        law, witness = self.controller.law, self.witness
+        size = sum(part.size for part in self.parameters)
+        memory, w = witness.memory.symbols("w")
+        moment, command = cs.SX.sym("moment", 2), cs.SX.sym("command", law.robot.n)
+        y = cs.SX.sym("y", 4 * law.robot.n + PLANT_ENERGIES.size)
+        controller, c = self.memory.symbols("c")
+        signals, z = self.signals.symbols("z")
+        p = cs.SX.sym("p", size + witness.parameters.size)
+        views = _views(self.parameters, p[:size])
+        x, passed = self.plant.view(y[: 4 * law.robot.n]), PLANT_ENERGIES.view(y[4 * law.robot.n :])
+        level = c.tank_energy if law.has_tank else -c.reference_energy  # which was lent
+        now = Instant(
+            time=moment[0],
+            q=x.q,
+            dq=x.dq,
+            tau_m=command,
+            link_kinetic=law.robot.arm.kinetic_energy(x.q, x.dq, views.plant),
+            link_potential=law.robot.arm.potential_energy(x.q, views.plant),
+            carried=law.robot.arm.potential_energy(x.q, views.model),
+            external=passed.external,
+            joint=passed.joint,
+            reference=c.reference_energy,
+            storage=z.shaped_kinetic_energy
+            + z.cartesian_spring_energy
+            + z.shaped_spring_energy
+            + z.compensated_energy
+            + z.gravity_storage,
+            books=level + c.law_storage + c.measured_port_energy + c.spilled_energy,
+            beyond=cs.if_else(moment[1] > 0, level + c.law_storage + passed.joint, -np.inf),
+        )
+        after = witness.after(w, now, witness.parameters.view(p[size:]))
+        arguments = [memory, moment, y, command, controller, signals, p]
+        return cs.Function("watch", arguments, [cs.densify(after)], {"cse": True})
 
 
 def _views(parts: Parts, p: cs.SX) -> SimpleNamespace:
