@@ -21,5 +21,6 @@ from passiflex.native.library import compile_source as compile_source
 from passiflex.native.library import load_external as load_external
 from passiflex.native.loop_state import LoopState as LoopState
 from passiflex.native.loop_state import Samples as Samples
+from passiflex.native.loop_state import Watch as Watch
 from passiflex.native.stability import fastest_pole as fastest_pole
 from passiflex.native.stability import stable_step as stable_step

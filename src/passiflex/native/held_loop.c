@@ -9,8 +9,8 @@
  * Runge-Kutta steps of order 4, none longer than `longest`.
  * out receives (x, quad, c, command in force, z) at every record_every-th sample, taken after control ran;
  * a row more than steps means one last sample without a period after it.
- * watch(w, [time, 1 at a sample or 0 at a step], y, command in force, c, z, p) -> w, if there is one, sees every
- * sample after control ran and the end of every step of the plant. Nothing is allocated here.
+ * A watch, if there is one, remembers w: look(w, time, y, command in force, c, z, p) -> w sees every sample after
+ * control ran, and glance(w, time, y, p) -> w the end of every step of the plant. Nothing is allocated here.
  * Returns the number of samples done: n_rows, or the first at which a number was not finite. */
 typedef struct {
     int (*f)(const double** arg, double** res, long long* iw, double* w, int memory);
@@ -44,35 +44,19 @@ static int passiflex_plant_step(
     return 0;
 }
 
-/* What a watch is shown, and what it remembers: w, and room for the next w. */
-typedef struct {
-    const passiflex_callable* f;
-    const double *y, *held, *c, *z, *p;
-    double *w, *next, moment[2];
-    long long n_w;
-} passiflex_watch;
-
-static int passiflex_look(passiflex_watch* watch, double time, double sample)
+/* Let a function of a watch remember w of n_w numbers; next has room for as many. */
+static int passiflex_remember(const passiflex_callable* f, double* w, double* next, long long n_w)
 {
-    const passiflex_callable* f = watch->f;
-    if (!f) return 0;
-    watch->moment[0] = time;
-    watch->moment[1] = sample;
-    f->arg[0] = watch->w;
-    f->arg[1] = watch->moment;
-    f->arg[2] = watch->y;
-    f->arg[3] = watch->held;
-    f->arg[4] = watch->c;
-    f->arg[5] = watch->z;
-    f->arg[6] = watch->p;
-    f->res[0] = watch->next;
+    f->arg[0] = w;
+    f->res[0] = next;
     if (f->f(f->arg, f->res, f->iw, f->w, f->memory)) return 1;
-    for (long long i = 0; i < watch->n_w; i++) watch->w[i] = watch->next[i];
+    for (long long i = 0; i < n_w; i++) w[i] = next[i];
     return 0;
 }
 
 CASADI_SYMBOL_EXPORT long long passiflex_held_loop(
-    const passiflex_callable* plant, const passiflex_callable* control, const passiflex_callable* watch,
+    const passiflex_callable* plant, const passiflex_callable* control,
+    const passiflex_callable* look, const passiflex_callable* glance,
     const long long* sizes, double* y, double* c, double* line, double* z, double* w,
     const double* rows, const double* timing, const double* p_plant, const double* p_control, const double* p_watch,
     long long first, long long n_rows, long long steps, double period, double longest, long long record_every,
@@ -85,7 +69,16 @@ CASADI_SYMBOL_EXPORT long long passiflex_held_loop(
     double *next = scratch, *command = next + n_c, *input = command + n_u;
     double *work = input + n_u + n_s, *held = line + 1, *queue = held + n_u;
     const long long entry = n_u + 1;
-    passiflex_watch seen = {watch, y, held, c, z, p_watch, w, work + 3 * n, {0.0, 0.0}, n_m};
+    double now, *next_w = work + 3 * n;
+
+    if (look) {
+        look->arg[1] = glance->arg[1] = &now;
+        look->arg[2] = glance->arg[2] = y;
+        look->arg[3] = held;
+        look->arg[4] = c;
+        look->arg[5] = z;
+        look->arg[6] = glance->arg[3] = p_watch;
+    }
 
     for (long long k = 0; k < n_rows; k++) {
         const double *row = rows + k * n_w, start = (double)(first + k) * period;
@@ -115,7 +108,8 @@ CASADI_SYMBOL_EXPORT long long passiflex_held_loop(
                 for (long long i = 0; i < waiting * entry; i++) queue[i] = queue[i + entry];
             }
             line[0] = (double)waiting;
-            if (t == 0.0 && passiflex_look(&seen, start, 1.0)) return k;
+            now = start;
+            if (look && t == 0.0 && passiflex_remember(look, w, next_w, n_m)) return k;
             if (t == 0.0 && k % record_every == 0) {
                 for (long long i = 0; i < n; i++) *out++ = y[i];
                 for (long long i = 0; i < n_c; i++) *out++ = c[i];
@@ -131,7 +125,8 @@ CASADI_SYMBOL_EXPORT long long passiflex_held_loop(
             const double h = (until - t) / count;
             for (long long i = 0; i < count; i++) {
                 if (passiflex_plant_step(plant, n_x, n_q, y, input, p_plant, h, work)) return k;
-                if (passiflex_look(&seen, start + (t + (i + 1) * h), 0.0)) return k;
+                now = start + (t + (i + 1) * h);
+                if (look && passiflex_remember(glance, w, next_w, n_m)) return k;
             }
             t = until;
         }

@@ -16,7 +16,7 @@ from passiflex.native.entry import Callable, Entry, address
 from passiflex.native.fixed_step import step_function
 from passiflex.native.function import NativeFunction
 from passiflex.native.library import c_source
-from passiflex.native.loop_state import LoopState, Samples
+from passiflex.native.loop_state import LoopState, Samples, Watch
 
 Array = NDArray[np.float64]
 
@@ -30,7 +30,7 @@ TOGETHER = 1e-9
 
 
 _ROUTINE = [
-    *[ctypes.c_void_p] * 14, *[ctypes.c_longlong] * 3, *[ctypes.c_double] * 2, ctypes.c_longlong,
+    *[ctypes.c_void_p] * 15, *[ctypes.c_longlong] * 3, *[ctypes.c_double] * 2, ctypes.c_longlong,
     *[ctypes.c_void_p] * 2,
 ]  # fmt: skip
 
@@ -47,7 +47,7 @@ class _Call(NamedTuple):
     timing: Array
     p_plant: Array
     p_control: Array
-    p_watch: Array
+    p_watch: Array | None
     first: int
     steps: int
     period: float
@@ -67,8 +67,7 @@ class HeldLoop:
     plant, control: The two functions; all inputs and outputs are columns.
     library: What `compile_functions([plant, control, …], driver=HELD_LOOP_DRIVER)` returned; None runs
         CasADi's virtual machine.
-    watch: Sees every sample and the end of every step of the plant, and remembers what it needs:
-        (memory, [time, 1 at a sample or 0 at a step], (x, quads), command, c, signals, p) → memory.
+    watch: What sees every sample and every step; its functions are in the library too.
     """
 
     def __init__(
@@ -76,7 +75,7 @@ class HeldLoop:
         plant: cs.Function,
         control: cs.Function,
         library: Path | None = None,
-        watch: cs.Function | None = None,
+        watch: Watch | None = None,
     ):
         if not _fit(plant, control):
             raise SizeError(
@@ -90,17 +89,16 @@ class HeldLoop:
         self.n_q, self.n_u, self.n_z = plant.size1_out(1), control.size1_out(1), control.size1_out(2)
         self.n_s = inputs - self.n_u
         self.n_line = 1 + self.n_u + LONGEST_LINE * (1 + self.n_u)
-        self.n_m: int = watch.size1_in(0) if watch is not None else 0
-        self.n_p_watch: int = watch.size1_in(6) if watch is not None else 0
+        self.n_m, self.n_p_watch = (watch.size, watch.parameters) if watch is not None else (0, 0)
         self._entries: list[Entry | None] | None = None
+        self._watch: list[NativeFunction] = []
         if library is not None:
-            self._entries = [
-                Entry(library, f.name()) if f is not None else None for f in (plant, control, watch)
-            ]
+            self._entries = [Entry(library, f.name()) for f in (plant, control, *(watch or ()))]
+            self._entries += [None] * (4 - len(self._entries))
             self._routine = Entry(library, plant.name()).routine("passiflex_held_loop", _ROUTINE)
         else:
             self._step, self._law = NativeFunction(step_function(plant)), NativeFunction(control)
-            self._watch = NativeFunction(watch) if watch is not None else None
+            self._watch = [NativeFunction(f) for f in watch or ()]
 
     def start(self, x: ArrayLike, controller: ArrayLike, command: ArrayLike) -> LoopState:
         """Return the state before the first sample, with `command` in force."""
@@ -128,7 +126,7 @@ class HeldLoop:
         *,
         last: bool = False,
         first: int = 0,
-        p_watch: ArrayLike = (),
+        p_watch: ArrayLike | None = None,
     ) -> Samples:
         """Return the samples of the rows, and the state after them.
 
@@ -142,7 +140,7 @@ class HeldLoop:
         record_every: Samples from one recorded to the next.
         last: True if the last row is a sample only, with no period after it.
         first: Number of the first sample, by which the watch tells the time.
-        p_watch: Parameters of the watch, if there is one.
+        p_watch: Parameters of the watch; None shows it nothing.
 
         Raises
         ------
@@ -176,7 +174,7 @@ class HeldLoop:
         given = (
             _column("p_plant", p_plant, self.n_p),
             _column("p_control", p_control, self.n_p_control),
-            _column("p_watch", p_watch, self.n_p_watch),
+            None if p_watch is None else _column("p_watch", p_watch, self.n_p_watch),
         )
         call = _Call(
             y,
@@ -201,14 +199,16 @@ class HeldLoop:
         return Samples(x, quads, memory, command, signals, completed, after)
 
     def _in_c(self, call: _Call, entries: list[Entry | None]) -> int:
-        callables = [Callable.of(entry) if entry is not None else None for entry in entries]
+        shown = entries if call.p_watch is not None else [*entries[:2], None, None]
+        callables = [Callable.of(entry) if entry is not None else None for entry in shown]
         sizes = np.array(
             [self.n_x, self.n_q, self.n_c, self.n_u, self.n_w, self.n_s, self.n_z, self.n_m], np.int64
         )
         scratch = np.full(self.n_c + 2 * self.n_u + self.n_s + 3 * (self.n_x + self.n_q) + self.n_m, np.nan)
+        arrays = [address(a) if a is not None else None for a in call[:10]]
         return self._routine(
-            *(ctypes.byref(f) if f is not None else None for f in callables), address(sizes),
-            *map(address, call[:10]), call.first, len(call.rows), *call[11:15], address(call.out), address(scratch),
+            *(ctypes.byref(f) if f is not None else None for f in callables), address(sizes), *arrays,
+            call.first, len(call.rows), *call[11:15], address(call.out), address(scratch),
         )  # fmt: skip
 
     def _in_machine(self, call: _Call) -> int:
@@ -244,8 +244,8 @@ class HeldLoop:
                     held[:] = queue[0, 1:]
                     queue[:-1] = queue[1:].copy()
                     line[0] -= 1
-                if t == 0.0 and self._watch is not None:
-                    w[:] = self._watch(w, [(first + k) * period, 1.0], y, held, c, z, p_watch)
+                if t == 0.0 and self._watch and p_watch is not None:
+                    w[:] = self._watch[0](w, (first + k) * period, y, held, c, z, p_watch)
                 if t == 0.0 and k % every == 0:
                     out[k // every] = np.concatenate([y, c, held, z])
                 if k >= steps or t >= period:
@@ -256,9 +256,8 @@ class HeldLoop:
                 h = (until - t) / count
                 for i in range(count):
                     y[:] = self._step(y, inputs, p_plant, h)
-                    if self._watch is not None:
-                        now = (first + k) * period + (t + (i + 1) * h)
-                        w[:] = self._watch(w, [now, 0.0], y, held, c, z, p_watch)
+                    if self._watch and p_watch is not None:
+                        w[:] = self._watch[1](w, (first + k) * period + (t + (i + 1) * h), y, p_watch)
                 t = until
             queue[: int(line[0]), 0] -= period
             if not np.isfinite(y).all():

@@ -3,8 +3,7 @@
  * The text before this one defines, for lanes, the generated functions and their sizes:
  *   PLANT(x, [command, surroundings], p) -> (dx, dquad)      CONTROL(x, c, row, p) -> (c, command, z)
  *   ROW(time, told, drawn) -> row                            TRUTH(x, command, surroundings, p) -> truth
- *   WATCH(w, [time, 1 at a sample or 0 at a step], y, command in force, c, z, p) -> w, if N_M is not 0: it sees
- *   what the watch of held_loop.c sees.
+ *   LOOK(w, time, y, command in force, c, z, p) -> w and GLANCE(w, time, y, p) -> w, if N_M is not 0, as in held_loop.c
  * What is told to a lane changes at single periods (changes, in the order of periods: period, lane, and where
  * in told_values its numbers stand); drawn are the numbers that chance gives to each period. timing holds for
  * each period and lane the delay of the command and whether the controller runs. Each lane keeps its own line
@@ -89,16 +88,22 @@ static void lane_plan(lane_clock* clock, const double* line, double period, doub
     clock->done = 0;
 }
 
-/* Let the watch see the lanes that are `moving`. */
-static void lane_look(const passiflex_lane_run* r, const lanes* held, lanes time, double sample, lane_bits moving)
+/* Let the watch see a sample of all lanes, or a step of those that are `moving`. */
+static void lane_look(const passiflex_lane_run* r, const lanes* held, lanes time)
 {
 #if N_M > 0
-    const lanes moment[2] = {time, all_lanes(sample)};
     lanes next[N_M];
-    WATCH(r->w, moment, r->y, held, r->c, r->z, r->p_watch, next);
+    LOOK(r->w, &time, r->y, held, r->c, r->z, r->p_watch, next);
+    memcpy(r->w, next, N_M * sizeof(lanes));
+#endif
+}
+
+static void lane_glance(const passiflex_lane_run* r, lanes time, lane_bits moving)
+{
+#if N_M > 0
+    lanes next[N_M];
+    GLANCE(r->w, &time, r->y, r->p_watch, next);
     for (int i = 0; i < N_M; i++) r->w[i] = where(moving, next[i], r->w[i]);
-#else
-    (void)r, (void)held, (void)time, (void)sample, (void)moving;
 #endif
 }
 
@@ -123,7 +128,7 @@ static void lane_period(const passiflex_lane_run* r, lanes* input, double start)
         }
         if (!some) return;
         lane_step(r->y, input, r->p_plant, h, moving);
-        lane_look(r, input, time, 0.0, moving);
+        lane_glance(r, time, moving);
         EACH_LANE if (!clock[l].arrived && --clock[l].left == 0)
         {
             double* line = r->line + l * LINE;
@@ -164,7 +169,7 @@ LANE_EXPORT void passiflex_lane_loop(const passiflex_lane_run* r)
             if (timing[LANES + l] != 0.0) lane_send(r->line + l * LINE, command, l, timing[l]);
             lane_receive(r->line + l * LINE, input, l, 0.0, r->period);
         }
-        lane_look(r, input, time, 1.0, all_bits(-1));
+        lane_look(r, input, time);
         if (k % r->record_every == 0) {
             lanes* s = seen;
             memcpy(s, r->y, N_Y * sizeof(lanes)), s += N_Y;

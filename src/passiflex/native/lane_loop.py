@@ -16,7 +16,7 @@ from passiflex.native.held_loop import LONGEST_LINE
 from passiflex.native.lane_data import LaneInputs, LaneSamples, LaneState, aligned
 from passiflex.native.lane_source import lane_source
 from passiflex.native.library import c_source, compile_source
-from passiflex.native.loop_state import LoopState
+from passiflex.native.loop_state import LoopState, Watch
 
 Array = NDArray[np.float64]
 
@@ -44,14 +44,22 @@ class LaneFunctions(NamedTuple):
     control: (x, c, row, p) → (c, command, signals); a row begins with the surroundings.
     row: (time, told, drawn) → row.
     truth: (x, command, surroundings, p) → what is true then, with p as for control.
-    watch: (memory, [time, 1 at a sample or 0 at a step], (x, quads), command, c, signals, p) → memory, or none.
+    watch: What sees every sample and every step, or none.
     """
 
     plant: cs.Function
     control: cs.Function
     row: cs.Function
     truth: cs.Function
-    watch: cs.Function | None = None
+    watch: Watch | None = None
+
+    @property
+    def there(self) -> dict[str, cs.Function]:
+        """Return all functions that there are, by name."""
+        return {
+            **dict(zip(self._fields, self[:4], strict=False)),
+            **(self.watch._asdict() if self.watch else {}),
+        }
 
 
 class LaneLoop:
@@ -82,8 +90,7 @@ class LaneLoop:
         self.n_told, self.n_drawn, self.n_w = f.row.size1_in(1), f.row.size1_in(2), f.row.size1_out(0)
         self.n_p_plant, self.n_p_control = f.plant.size1_in(2), f.control.size1_in(3)
         self.n_truth = f.truth.size1_out(0)
-        self.n_m: int = f.watch.size1_in(0) if f.watch is not None else 0
-        self.n_p_watch: int = f.watch.size1_in(6) if f.watch is not None else 0
+        self.n_m, self.n_p_watch = (f.watch.size, f.watch.parameters) if f.watch is not None else (0, 0)
         _require_fit(f, self)
         self.n_line = 1 + self.n_u + LONGEST_LINE * (1 + self.n_u)
         self.library = compile_source(self._source(f, width))
@@ -211,10 +218,9 @@ class LaneLoop:
             "N_TRUTH": self.n_truth, "LONGEST_LINE": LONGEST_LINE,
         }  # fmt: skip
         lines = [f"enum {{ {', '.join(f'{name} = {size}' for name, size in sizes.items())} }};"]
-        there = {part: g for part, g in f._asdict().items() if g is not None}
-        lines += [f"#define {part.upper()} {g.name()}_in_lanes" for part, g in there.items()]
+        lines += [f"#define {part.upper()} {g.name()}_in_lanes" for part, g in f.there.items()]
         lines.append(f"#define N_M {self.n_m}")
-        return "\n".join((lane_source(list(there.values()), width), *lines, c_source("lane_loop.c")))
+        return "\n".join((lane_source(list(f.there.values()), width), *lines, c_source("lane_loop.c")))
 
 
 def _require_range(
@@ -234,9 +240,11 @@ def _require_fit(f: LaneFunctions, n: LaneLoop) -> None:
         "truth": ((n.n_x, n.n_u, n.n_s, n.n_p_control), (n.n_truth,)),
     }
     if f.watch is not None:
-        needed["watch"] = ((n.n_m, 2, n.n_x + n.n_q, n.n_u, n.n_c, n.n_z, n.n_p_watch), (n.n_m,))
+        seen = (n.n_m, 1, n.n_x + n.n_q)
+        needed["look"] = ((*seen, n.n_u, n.n_c, n.n_z, n.n_p_watch), (n.n_m,))
+        needed["glance"] = ((*seen, n.n_p_watch), (n.n_m,))
     for name, sizes in needed.items():
-        g = getattr(f, name)
+        g = f.there[name]
         parts = [g.sparsity_in(i) for i in range(g.n_in())], [g.sparsity_out(i) for i in range(g.n_out())]
         found = tuple(tuple(part.size1() if part.size2() <= 1 else -1 for part in side) for side in parts)
         if found != sizes or not all(part.is_dense() for side in parts for part in side):

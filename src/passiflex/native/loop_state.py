@@ -4,10 +4,34 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import casadi as cs
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+
+
+class Watch(NamedTuple):
+    """Two functions that see a loop and remember what they need.
+
+    Attributes
+    ----------
+    look: At every sample, after the controller ran: (memory, time, (x, quads), command, c, signals, p) → memory.
+    glance: At the end of every step of the plant: (memory, time, (x, quads), p) → memory.
+    """
+
+    look: cs.Function
+    glance: cs.Function
+
+    @property
+    def size(self) -> int:
+        """Return the size of the memory."""
+        return int(self.look.size1_in(0))
+
+    @property
+    def parameters(self) -> int:
+        """Return the number of parameters, which both are given."""
+        return int(self.look.size1_in(6))
 
 
 class LoopState(NamedTuple):

@@ -6,8 +6,17 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
+import numpy as np
+
 from passiflex.passivity.extremes import Extremes, available_energy, extremes
-from passiflex.passivity.ledger import Balance, Signals, claimed_balance, link_balance, robot_balance
+from passiflex.passivity.ledger import (
+    Balance,
+    Signals,
+    claimed_balance,
+    link_balance,
+    motor_side_storage,
+    robot_balance,
+)
 from passiflex.simulation.unbooked import listed
 from passiflex.simulation.witness import TERMS
 
@@ -64,7 +73,7 @@ def audit(run: Signals) -> Audit:
     """Return the audit of a run."""
     balances = robot_balance(run), link_balance(run), claimed_balance(run)
     found = extremes(run)
-    verdict, time, term, remedy = _judged(run, found)
+    verdict, time, term, remedy = _judged(run, found, readable=_readable(run, balances[1]))
     return Audit(
         verdict=verdict,
         time=time,
@@ -81,7 +90,13 @@ def audit(run: Signals) -> Audit:
     )
 
 
-def _judged(run: Signals, found: Extremes) -> tuple[Verdict, float, str, str]:
+def _readable(run: Signals, links: Balance) -> bool:
+    """Return whether all numbers that a verdict could be read from are finite."""
+    parts = available_energy(run), motor_side_storage(run), links.residual
+    return all(np.isfinite(part).all() for part in parts)
+
+
+def _judged(run: Signals, found: Extremes, *, readable: bool) -> tuple[Verdict, float, str, str]:
     """Return the verdict, when it was decided, what had taken most by then, and the remedy."""
     least = found.time, found.term
     if found.possible < 0:
@@ -91,7 +106,7 @@ def _judged(run: Signals, found: Extremes) -> tuple[Verdict, float, str, str]:
     if not found.sure >= 0:  # so that a NaN can never be passive
         why = "the margin is below the integration error: lower the tolerance"
         return "inconclusive", found.doubt_time, found.doubt_term, why
-    if not math.isfinite(float(available_energy(run).sum())):
+    if not readable:
         return "inconclusive", *least, "numbers that the books are read from are not finite"
     return "passive", *least, "none needed"
 

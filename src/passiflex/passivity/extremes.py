@@ -20,6 +20,10 @@ from passiflex.passivity.ledger import (
 from passiflex.simulation.witness import ROUND_OFF, TERMS
 
 
+ROUNDING = 1e-9
+"""Share of a margin (or of 1 J) by which rows and steps may differ: both are sums of the same numbers."""
+
+
 class Extremes(NamedTuple):
     """What a verdict rests on; times in s, energies in J.
 
@@ -50,11 +54,18 @@ class Extremes(NamedTuple):
 
 
 def extremes(run: Signals) -> Extremes:
-    """Return the extremes of a run: what its loop noted, or those of its rows if it is older than that."""
+    """Return the extremes of a run: what its loop noted, or those of its rows if it is older than that.
+
+    The rows are among the steps. Where they tell of less than was noted, something is wrong with the file, and
+    the worse of the two counts.
+    """
+    rows = extremes_of_rows(run)
     try:
-        return _noted(run)
+        noted = _noted(run)
     except KeyError:  # how a run says that it has no signal of this name
-        return extremes_of_rows(run)
+        return rows
+    rounding = noted.integration_error + ROUNDING * max(1.0, abs(noted.margin))
+    return rows if rows.margin < noted.margin - rounding else noted
 
 
 def _noted(run: Signals) -> Extremes:
@@ -62,7 +73,8 @@ def _noted(run: Signals) -> Extremes:
         return float(run[name])
 
     def term(name: str) -> str:
-        return TERMS[int(run[name])]
+        which = number(name)
+        return TERMS[int(which)] if 0 <= which < len(TERMS) else TERMS[0]
 
     least = number("least_margin"), number("least_margin_time"), term("least_margin_term")
     return Extremes(

@@ -26,7 +26,7 @@ from passiflex.simulation.simulate_sampled import (
     simulate_unchecked,
     start,
 )
-from passiflex.simulation.unbooked import UNKNOWN, unbooked
+from passiflex.simulation.unbooked import unbooked
 from passiflex.simulation.witness import Noted
 
 Array = NDArray[np.float64]
@@ -44,23 +44,25 @@ class Recording:
 
     Attributes
     ----------
-    signals: By name, arrays whose first axis is the row; and what `Witness` noted, which has no such axis.
+    signals: By name, arrays whose first axis is the row.
     time: Of the rows [s].
     failure: Why the run ended early; empty if it did not.
     has_tank: Whether its law has a tank.
     unbooked: What the law's books do not know in it, in words.
+    noted: What was noted at every step, whatever was asked for.
     """
 
     signals: dict[str, Array]
     time: Array
     failure: str
     has_tank: bool
-    unbooked: str = UNKNOWN
+    unbooked: str
+    noted: dict[str, Array]
     sampled: bool = True
 
     def __getitem__(self, name: str) -> Array:
-        """Return a signal as an array; time is the first axis."""
-        return self.signals[name]
+        """Return a signal as an array, time is the first axis; or what was noted."""
+        return self.signals[name] if name in self.signals else self.noted[name]
 
 
 def simulate_batch(
@@ -156,9 +158,9 @@ def _alone(problem: Problem, keep: Sequence[str]) -> Recording:
     for name in keep:
         if name not in known:
             raise NameUnknownError("signal", name, known)
-    extremes = [f.name for f in _compiled(problem).loop.witness.extremes]
-    signals = {name: run[name] for name in (*keep, *extremes)}
-    return Recording(signals, run.time, run.failure, run.has_tank, run.unbooked)
+    noted = {f.name: run[f.name] for f in _compiled(problem).loop.witness.extremes}
+    signals = {name: run[name] for name in keep}
+    return Recording(signals, run.time, run.failure, run.has_tank, run.unbooked, noted)
 
 
 def _advance(
@@ -274,7 +276,7 @@ def _recording(
     }
     time = np.arange(count, dtype=np.float64) * (s.period * every)
     failure = "" if ended == samples else left_finite(ended * s.period)
-    return Recording(signals | noted.values, time, failure, problem.law.has_tank, unbooked(problem))
+    return Recording(signals, time, failure, problem.law.has_tank, unbooked(problem), noted.values)
 
 
 def simulate_in_lane(problem: Problem) -> Run:
@@ -289,6 +291,5 @@ def simulate_in_lane(problem: Problem) -> Run:
         Rows(layout, np.hstack([recording[f.name].reshape(len(recording.time), f.size) for f in layout]))
         for layout in layouts
     ]
-    extremes = loop.witness.extremes
-    noted = Noted(extremes, {f.name: recording[f.name] for f in extremes})
+    noted = Noted(loop.witness.extremes, recording.noted)
     return assemble(problem, recording.time, rows, [], recording.failure, noted)

@@ -221,7 +221,7 @@ class ClosedLoop:
     @cached_property
     def witness(self) -> Witness:
         """Return what notes the extremes."""
-        return Witness.of(self.law.robot, has_tank=self.law.has_tank, motors=False)
+        return Witness.of(self.law.robot, has_tank=self.law.has_tank, sampled=False)
 
     @cached_property
     def watch(self) -> cs.Function:
@@ -255,7 +255,7 @@ class ClosedLoop:
             storage=storage + carried,
             books=held - passed.external - passed.reference + passed.drawn + passed.spilled,
         )
-        after = witness.after(w, now, witness.parameters.view(p_watch))
+        after = witness.look(w, now, witness.parameters.view(p_watch))
         arguments = [memory, time, cs.vertcat(x, energies), u, cs.vertcat(p, p_watch)]
         return cs.Function("watch", arguments, [cs.densify(after)], {"cse": True})
 

@@ -86,7 +86,7 @@ def compiled_sampled_loop(controller: SampledController) -> CompiledSampledLoop:
     if key not in _built_sampled:
         loop = SampledLoop(controller)
         functions = [loop.plant.rhs, loop.control, loop.outputs, loop.period.function]
-        library = compile_functions([*functions, loop.watch], driver=HELD_LOOP_DRIVER)
+        library = compile_functions([*functions, *loop.watch], driver=HELD_LOOP_DRIVER)
         native = [NativeFunction(f, library) for f in functions]
         held = HeldLoop(loop.plant.rhs, loop.control, library, loop.watch)
         _built_sampled[key] = CompiledSampledLoop(loop, held, *native)

@@ -8,10 +8,10 @@ from types import SimpleNamespace
 from typing import NamedTuple
 
 import casadi as cs
-import numpy as np
 
 from passiflex.control.signals import Measurement
 from passiflex.layout import Field, Layout
+from passiflex.native import Watch
 from passiflex.robots.arm import EndEffectorPose
 from passiflex.sampled.controller import SampledController
 from passiflex.sampled.motors import limit_layout, limited
@@ -42,7 +42,8 @@ class SampledLoop:
     """Plant and controller as functions of flat vectors, ready for code generation.
 
     `plant.rhs` is the plant; `control` is (x, c, row, p) → (c, command, signals), one period; `outputs` is
-    (x, command, surroundings, p) → what is true then; `period` makes the rows; `watch` is what `witness` notes.
+    (x, command, surroundings, p) → what is true then; `period` makes the rows; `watch` is
+    the witness at work.
     """
 
     controller: SampledController
@@ -225,47 +226,50 @@ class SampledLoop:
     @cached_property
     def witness(self) -> Witness:
         """Return what notes the extremes."""
-        return Witness.of(self.controller.law.robot, has_tank=self.controller.law.has_tank, motors=True)
+        return Witness.of(self.controller.law.robot, has_tank=self.controller.law.has_tank, sampled=True)
 
     @cached_property
-    def watch(self) -> cs.Function:
-        """Return (memory, [time, 1 at a sample or 0 at a step], (x, energies), command, c, signals, p) → memory.
-
-        p is that of `control`, then that of the witness.
-        """
-        law, witness = self.controller.law, self.witness
-        size = sum(part.size for part in self.parameters)
+    def watch(self) -> Watch:
+        """Return what the witness does at a sample and at a step; its p is that of `control`, then its own."""
+        law, witness, n = self.controller.law, self.witness, self.controller.law.robot.n
+        arm, size = law.robot.arm, sum(part.size for part in self.parameters)
         memory, w = witness.memory.symbols("w")
-        moment, command = cs.SX.sym("moment", 2), cs.SX.sym("command", law.robot.n)
-        y = cs.SX.sym("y", 4 * law.robot.n + PLANT_ENERGIES.size)
+        time, command, y = (
+            cs.SX.sym("time"),
+            cs.SX.sym("command", n),
+            cs.SX.sym("y", 4 * n + PLANT_ENERGIES.size),
+        )
         controller, c = self.memory.symbols("c")
         signals, z = self.signals.symbols("z")
         p = cs.SX.sym("p", size + witness.parameters.size)
         views = _views(self.parameters, p[:size])
-        x, passed = self.plant.view(y[: 4 * law.robot.n]), PLANT_ENERGIES.view(y[4 * law.robot.n :])
+        x, passed = self.plant.view(y[: 4 * n]), PLANT_ENERGIES.view(y[4 * n :])
         level = c.tank_energy if law.has_tank else -c.reference_energy  # which was lent
+        claimed = ("shaped_kinetic", "cartesian_spring", "shaped_spring", "compensated")
+        carried = arm.potential_energy(x.q, views.model)
         now = Instant(
-            time=moment[0],
+            time=time,
             q=x.q,
             dq=x.dq,
             tau_m=command,
-            link_kinetic=law.robot.arm.kinetic_energy(x.q, x.dq, views.plant),
-            link_potential=law.robot.arm.potential_energy(x.q, views.plant),
-            carried=law.robot.arm.potential_energy(x.q, views.model),
+            link_kinetic=arm.kinetic_energy(x.q, x.dq, views.plant),
+            link_potential=arm.potential_energy(x.q, views.plant),
+            carried=carried,
             external=passed.external,
             joint=passed.joint,
             reference=c.reference_energy,
-            storage=z.shaped_kinetic_energy
-            + z.cartesian_spring_energy
-            + z.shaped_spring_energy
-            + z.compensated_energy
-            + z.gravity_storage,
+            storage=sum((getattr(z, f"{part}_energy") for part in claimed), z.gravity_storage),
             books=level + c.law_storage + c.measured_port_energy + c.spilled_energy,
-            beyond=cs.if_else(moment[1] > 0, level + c.law_storage + passed.joint, -np.inf),
+            beyond=level + c.law_storage + passed.joint,
+            latched=c.latched,
         )
-        after = witness.after(w, now, witness.parameters.view(p[size:]))
-        arguments = [memory, moment, y, command, controller, signals, p]
-        return cs.Function("watch", arguments, [cs.densify(after)], {"cse": True})
+        looked = witness.look(w, now, witness.parameters.view(p[size:]))
+        glanced = witness.glance(w, time, passed.joint, carried)
+        seen = [memory, time, y, command, controller, signals, p]
+        return Watch(
+            cs.Function("look", seen, [cs.densify(looked)], {"cse": True}),
+            cs.Function("glance", [memory, time, y, p], [cs.densify(glanced)], {"cse": True}),
+        )
 
 
 def _views(parts: Parts, p: cs.SX) -> SimpleNamespace:

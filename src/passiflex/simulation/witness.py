@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from passiflex.layout import Field, Layout
 from passiflex.robots.flexible import FlexibleJointRobot
+from passiflex.simulation.joint_extremes import JointExtremes
 
 Array = NDArray[np.float64]
 
@@ -28,8 +29,6 @@ TERMS = (
 """What may have taken most of the energy; the last is what the law's books miss, whatever it comes from."""
 LARGEST = 1e300
 """An energy [J] beyond it is that of a run that leaves the finite numbers, and decides nothing."""
-SLACK = 1e-9
-"""Share of a limit by which rounding may pass it."""
 
 
 class Instant(NamedTuple):
@@ -47,7 +46,8 @@ class Instant(NamedTuple):
     storage: S̃, with the weight carried.
     books: Stored, less supplied, plus lost, by the law's own books: constant if they are right.
     beyond: What the law claims to have, and what it gave: constant or falling unless it claims more than is there;
-        −∞ where it claims nothing. None if its books are no more than `books`.
+        None if `books` are all that it keeps.
+    latched: Whether it has fallen back; None for a law that does not.
     """
 
     time: cs.SX
@@ -63,6 +63,7 @@ class Instant(NamedTuple):
     storage: cs.SX
     books: cs.SX
     beyond: cs.SX | None = None
+    latched: cs.SX | None = None
 
 
 class Noted(NamedTuple):
@@ -82,56 +83,47 @@ class Witness:
 
     Parameters
     ----------
-    n: Joints.
-    angle, speed, torque: Units of their quantities.
+    joints: What it notes of the joints.
     has_tank: Whether the law has a tank.
-    motors: Whether the motors' torque is known at every step.
+    sampled: Whether the law runs once per period, and may fall back.
     """
 
-    n: int
-    angle: str
-    speed: str
-    torque: str
+    joints: JointExtremes
     has_tank: bool
-    motors: bool
+    sampled: bool
 
     @classmethod
-    def of(cls, robot: FlexibleJointRobot, *, has_tank: bool, motors: bool) -> Witness:
+    def of(cls, robot: FlexibleJointRobot, *, has_tank: bool, sampled: bool) -> Witness:
         """Return the witness for loops of a robot."""
-        return cls(robot.n, *robot.arm.chain.joint_units, has_tank, motors)
+        units = robot.arm.chain.joint_units
+        return cls(JointExtremes(robot.n, *units, motors=sampled), has_tank, sampled)
 
     @cached_property
     def parameters(self) -> Layout:
         """Return the numbers that it is told."""
-        n = self.n
-        return Layout(
-            (
-                Field("initial_tank", (), "J", "T₀; 0 for a law without a tank"),
-                Field("lower_position_limit", (n,), self.angle, "of the robot"),
-                Field("upper_position_limit", (n,), self.angle, "of the robot"),
-                Field("velocity_limit", (n,), self.speed, "of the robot"),
-                Field("torque_limit", (n,), self.torque, "of the robot"),
-            )
+        return (
+            Layout((Field("initial_tank", (), "J", "T₀; 0 for a law without a tank"),)) + self.joints.limits
         )
 
     @cached_property
-    def start(self) -> Layout:
-        """Return what it remembers of the start, for itself."""
+    def own(self) -> Layout:
+        """Return what it remembers for itself: the start, the last look, and S̃₀ + T₀ with what was lent since."""
         kept = (
-            "noted",
             "link_start",
             "carried_start",
             "storage_start",
             "books_start",
             "beyond_start",
             "largest",
+            "whole",
         )
-        return Layout(tuple(Field(name, (), "J") for name in kept))
+        whether, when = Field("noted", (), "1"), Field("looked", (), "s")
+        return Layout((whether, when, *(Field(name, (), "J") for name in kept)))
 
     @cached_property
     def extremes(self) -> Layout:
         """Return what it remembers for those who read the run."""
-        n, never = self.n, "infinite if never"
+        never = "infinite if never"
         energies = (
             Field("least_margin", (), "J", "least of S̃₀ + T₀ − W̃ over all time"),
             Field("least_margin_time", (), "s", "when it was"),
@@ -144,106 +136,99 @@ class Witness:
             Field("largest_integration_error", (), "J", "largest residual of the links' balance"),
             Field("largest_books_error", (), "J", "by how much the law's books were wrong at most"),
         )
-        joints = [
-            Field("lowest_q", (n,), self.angle, "least link position"),
-            Field("highest_q", (n,), self.angle, "largest link position"),
-            Field("highest_speed", (n,), self.speed, "largest |q̇|"),
-        ]
-        joints += [Field("highest_torque", (n,), self.torque, "largest |τ_m|")] if self.motors else []
-        for kind in self.kinds:
-            joints.append(
-                Field(f"{kind}_time", (), "s", f"first time beyond a joint's {kind} limit, {never}")
-            )
-            joints.append(Field(f"{kind}_joint", (), "1", "which joint that was, from 1"))
-        return Layout((*energies, *joints))
-
-    @property
-    def kinds(self) -> tuple[str, ...]:
-        """Return the kinds of limits that are watched."""
-        return ("position", "speed", *["torque"] * self.motors)
+        fallback = Field("fallback_time", (), "s", f"when the law fell back, {never}")
+        return Layout((*energies, *[fallback] * self.sampled)) + self.joints.layout
 
     @property
     def memory(self) -> Layout:
         """Return all that is remembered."""
-        return self.start + self.extremes
+        return self.own + self.extremes
 
     def numbers(self, robot: FlexibleJointRobot, initial: float) -> Array:
         """Return the parameters; limits may be infinite."""
-        low, high = robot.position_limit.T
-        return np.concatenate(
-            [[initial * self.has_tank], low, high, robot.velocity_limit, robot.torque_limit]
-        ).astype(float)
+        return np.concatenate([[initial * self.has_tank], self.joints.numbers(robot)])
 
     def noted(self, memory: Array) -> Noted:
         """Return what is of interest of a memory. A storage counts from its lowest value, if that is negative."""
-        values = self.extremes.unpack(memory[self.start.size :].copy())
+        values = self.extremes.unpack(memory[self.own.size :].copy())
         for name in ("least_margin", "least_margin_sure", "least_margin_possible"):
             values[name] -= np.minimum(values["lowest_storage"], 0.0)
         return Noted(self.extremes, values)
 
-    def after(self, w: SimpleNamespace, now: Instant, g: SimpleNamespace) -> cs.SX:
+    def glance(self, w: SimpleNamespace, time: cs.SX, joint: cs.SX, carried: cs.SX) -> cs.SX:
+        """Return the memory after an instant between two looks, at which only W̃ has changed.
+
+        What had taken most by then is seen at the next look.
+        """
+        return self.memory.stack(vars(w) | self._margin(w, w.whole, time, joint - carried + w.carried_start))
+
+    def look(self, w: SimpleNamespace, now: Instant, g: SimpleNamespace) -> cs.SX:
         """Return the memory after an instant."""
         first = w.noted < 1
-        link = now.link_kinetic + now.link_potential
-        begun = {
-            "link_start": link,
-            "carried_start": now.carried,
-            "storage_start": now.storage - now.reference,
-            "books_start": now.books,
-            "beyond_start": cs.SX(0) if now.beyond is None else now.beyond,
-        }
-        start = SimpleNamespace(**{k: cs.if_else(first, v, getattr(w, k)) for k, v in begun.items()})
-        error = cs.fmax(
-            w.largest_integration_error, cs.fabs(link - start.link_start - now.external - now.joint)
-        )
-        largest = cs.fmax(w.largest, cs.fabs(link))
-        values = vars(start) | {"noted": 1, "largest": largest}
-        values |= self._margin(w, now, start, g, first, error, ROUND_OFF * cs.fmax(1, largest))
-        values["largest_integration_error"] = error
+        start, was = self._start(w, now, g, first)
+        residual = now.link_kinetic + now.link_potential - start.link_start - now.external - now.joint
+        was.largest_integration_error = cs.fmax(w.largest_integration_error, cs.fabs(residual))
         missed = now.books - start.books_start
         wrong = cs.fabs(missed) if now.beyond is None else now.beyond - start.beyond_start
-        values["largest_books_error"] = cs.fmax(w.largest_books_error, wrong)
-        values |= self._joints(w, now, g, first)
-        return self.memory.stack(values)
+        found = self._margin(was, start.whole, now.time, now.joint - now.carried + start.carried_start)
+        lower = cs.logic_or(found["least_margin"] < was.least_margin, w.looked < found["least_margin_time"])
+        over = cs.logic_and(w.looked < found["overdraft_time"], found["overdraft_time"] <= now.time)
+        term = self._term(now, missed)
+        terms = {
+            "least_margin_term": cs.if_else(cs.logic_and(lower, w.noted), term, w.least_margin_term),
+            "overdraft_term": cs.if_else(over, term, w.overdraft_term),
+        }
+        known = {"noted": 1, "looked": now.time, "largest_books_error": cs.fmax(w.largest_books_error, wrong)}
+        if now.latched is not None:
+            fallback = cs.if_else(first, np.inf, w.fallback_time)
+            known["fallback_time"] = cs.if_else(now.latched > 0, cs.fmin(fallback, now.time), fallback)
+        joints = self.joints.after(w, now.time, now.q, now.dq, now.tau_m, g, first)
+        return self.memory.stack(vars(start) | vars(was) | found | terms | known | joints)
 
-    def _margin(
-        self,
-        w: SimpleNamespace,
-        now: Instant,
-        start: SimpleNamespace,
-        g: SimpleNamespace,
-        first: cs.SX,
-        error: cs.SX,
-        round_off: cs.SX,
-    ) -> dict[str, cs.SX]:
-        whole = g.initial_tank + start.storage_start
-        given = now.joint - (now.carried - start.carried_start)
-        margin = whole - given + (0 if self.has_tank else now.reference)
-        usable = cs.fabs(margin) < LARGEST
-        term = self._term(now, now.books - start.books_start)
-        least = cs.if_else(first, whole, w.least_margin)
-        lower = cs.logic_and(usable, margin < least)
-        stored = cs.if_else(first, start.storage_start, w.lowest_storage)
-        lowest = cs.if_else(now.storage < stored, now.storage, stored)
-        sure, possible = (
-            _least(usable, margin + e, cs.if_else(first, whole + round_off, kept))
-            for e, kept in (
-                (round_off - error, w.least_margin_sure),
-                (round_off + error, w.least_margin_possible),
-            )
+    def _start(
+        self, w: SimpleNamespace, now: Instant, g: SimpleNamespace, first: cs.SX
+    ) -> tuple[SimpleNamespace, SimpleNamespace]:
+        """Return what is remembered of the start, and of the extremes before this instant; all begins with it."""
+
+        def kept(name: str, begins: cs.SX | float) -> cs.SX:
+            return cs.if_else(first, begins, getattr(w, name))
+
+        link = now.link_kinetic + now.link_potential
+        start = SimpleNamespace(
+            link_start=kept("link_start", link),
+            carried_start=kept("carried_start", now.carried),
+            storage_start=kept("storage_start", now.storage - now.reference),
+            books_start=kept("books_start", now.books),
+            beyond_start=kept("beyond_start", 0 if now.beyond is None else now.beyond),
         )
-        before = cs.if_else(first, np.inf, w.overdraft_time)
-        overdrawn = cs.logic_and(usable, margin + error + round_off - cs.fmin(lowest, 0) < 0)
-        overdrawn = cs.logic_and(overdrawn, before == np.inf)
+        whole = g.initial_tank + start.storage_start
+        start.whole = whole if self.has_tank else whole + now.reference
+        was = SimpleNamespace(
+            largest=cs.fmax(w.largest, cs.fabs(link)),
+            lowest_storage=_lower(now.storage, kept("lowest_storage", start.storage_start)),
+            least_margin=kept("least_margin", whole),
+            least_margin_time=kept("least_margin_time", now.time),
+            least_margin_sure=kept("least_margin_sure", whole + ROUND_OFF),
+            least_margin_possible=kept("least_margin_possible", whole + ROUND_OFF),
+            overdraft_time=kept("overdraft_time", np.inf),
+        )
+        return start, was
+
+    def _margin(self, w: SimpleNamespace, whole: cs.SX, time: cs.SX, given: cs.SX) -> dict[str, cs.SX]:
+        """Return what the margin `whole` − `given` changes of what is remembered."""
+        margin, error = whole - given, w.largest_integration_error
+        round_off = ROUND_OFF * cs.fmax(1, w.largest)
+        usable = cs.fabs(margin) < LARGEST
+        lower = cs.logic_and(usable, margin < w.least_margin)
+        possible = margin + error + round_off
+        overdrawn = cs.logic_and(usable, possible < cs.fmin(w.lowest_storage, 0))
+        overdrawn = cs.logic_and(overdrawn, w.overdraft_time == np.inf)
         return {
-            "least_margin": cs.if_else(lower, margin, least),
-            "least_margin_time": cs.if_else(cs.logic_or(first, lower), now.time, w.least_margin_time),
-            "least_margin_term": cs.if_else(lower, term, w.least_margin_term),
-            "least_margin_sure": sure,
-            "least_margin_possible": possible,
-            "overdraft_time": cs.if_else(overdrawn, now.time, before),
-            "overdraft_term": cs.if_else(overdrawn, term, w.overdraft_term),
-            "lowest_storage": lowest,
+            "least_margin": cs.if_else(lower, margin, w.least_margin),
+            "least_margin_time": cs.if_else(lower, time, w.least_margin_time),
+            "least_margin_sure": _lower(margin - error + round_off, w.least_margin_sure),
+            "least_margin_possible": _lower(possible, w.least_margin_possible),
+            "overdraft_time": cs.if_else(overdrawn, time, w.overdraft_time),
         }
 
     def _term(self, now: Instant, missed: cs.SX) -> cs.SX:
@@ -259,31 +244,7 @@ class Witness:
             term, most = cs.if_else(draw > most, number, term), cs.fmax(draw, most)
         return term
 
-    def _joints(self, w: SimpleNamespace, now: Instant, g: SimpleNamespace, first: cs.SX) -> dict[str, cs.SX]:
-        speed = cs.fabs(now.dq)
-        values = {
-            "lowest_q": cs.fmin(cs.if_else(first, now.q, w.lowest_q), now.q),
-            "highest_q": cs.fmax(cs.if_else(first, now.q, w.highest_q), now.q),
-            "highest_speed": cs.fmax(w.highest_speed, speed),
-        }
-        beyond = {
-            "position": cs.fmax(g.lower_position_limit - now.q, now.q - g.upper_position_limit),
-            "speed": speed - (1 + SLACK) * g.velocity_limit,
-        }
-        if now.tau_m is not None:
-            torque = cs.fabs(now.tau_m)
-            values["highest_torque"] = cs.fmax(w.highest_torque, torque)
-            beyond["torque"] = torque - (1 + SLACK) * g.torque_limit
-        for kind, excess in beyond.items():
-            before = cs.if_else(first, np.inf, getattr(w, f"{kind}_time"))
-            joint = cs.SX(0)
-            for i in reversed(range(self.n)):
-                joint = cs.if_else(excess[i] > 0, i + 1, joint)
-            begins = cs.logic_and(joint > 0, before == np.inf)
-            values[f"{kind}_time"] = cs.if_else(begins, now.time, before)
-            values[f"{kind}_joint"] = cs.if_else(begins, joint, getattr(w, f"{kind}_joint"))
-        return values
 
-
-def _least(usable: cs.SX, value: cs.SX, kept: cs.SX) -> cs.SX:
-    return cs.if_else(cs.logic_and(usable, value < kept), value, kept)
+def _lower(value: cs.SX, kept: cs.SX) -> cs.SX:
+    """Return the lower of two; what is no number, or that of a run that leaves them, lowers nothing."""
+    return cs.if_else(cs.logic_and(value > -LARGEST, value < kept), value, kept)
