@@ -19,7 +19,6 @@ from passiflex.passivity.ledger import (
 )
 from passiflex.simulation.witness import ROUND_OFF, TERMS
 
-
 ROUNDING = 1e-9
 """Share of a margin (or of 1 J) by which rows and steps may differ: both are sums of the same numbers."""
 

@@ -24,9 +24,11 @@ USUAL_TOLERANCE = 1e-9
 """Tolerance for which these shares are meant; the error of a step of order 4 goes with its fourth power."""
 MOST_STEPS = 20_000_000
 """Steps of one stretch at most, about two minutes; more of them is no simulation but a mistake."""
-CHECK, FIRST_CHECK, MOST_CHECKS = 1e-3, 1e-6, 100_000
-"""A smooth stretch is looked at every millisecond [s], after an event from a microsecond on, each time twice as late;
-in a stretch of more than so many milliseconds, so many times."""
+CHECK, FIRST_CHECK, MOST_CHECKS = 0.5e-3, 1e-6, 100_000
+"""A smooth stretch is looked at so often [s], after an event from a microsecond on, each time twice as late; a stretch
+of more than so many such intervals, so many times."""
+CLOSER = 64
+"""Looks between the two that are next to an extremum: what h²/8 of its second derivative hides is then 1e-3 as much."""
 SLOW_POLE = 1e4
 """Up to this pole [1/s] Runge-Kutta resolves a run faster than CVODES, which crawls along undamped modes."""
 
@@ -84,6 +86,11 @@ def smooth_stretch(
     time = begun.watched.time + np.concatenate([[0.0], times])
     watched = stepper.watch_rows(begun.watched, time, seen, u) if not failure else begun.watched.memory
     return Stretch(states[asked], energies[asked], failure, watched)
+
+
+def around(time: float, end: float) -> Array:
+    """Return instants around one of a smooth stretch that was looked at [s], from which its extremum is seen."""
+    return np.linspace(max(time - CHECK, FIRST_CHECK), min(time + CHECK, end), CLOSER)
 
 
 def _checked(instants: Array) -> tuple[Array, NDArray[np.intp]]:

@@ -18,6 +18,7 @@ from passiflex.simulation.integrate import (
     SLOW_POLE,
     Begun,
     Stretch,
+    around,
     held_stretch,
     resolved_stretch,
     share_for,
@@ -185,13 +186,28 @@ class _Simulation:
         if pole <= SLOW_POLE:
             share = share_for(RESOLVED, problem.tolerance)
             return resolved_stretch(stepper, self.x, u, self.p, after, pole, share, begun)
-        smooth = smooth_stretch(
-            self.compiled.rhs, self.x, u, self.p, after, problem.tolerance, stepper, begun
-        )
+        smooth = self._smooth(u, after, begun)
         if not smooth.failure:
             return smooth
         # A run that CVODES gives up on is followed to its end by steps that are merely stable.
         return resolved_stretch(stepper, self.x, u, self.p, after, pole, SAFETY, begun)
+
+    def _smooth(self, u: Array, after: Array, begun: Begun) -> Stretch:
+        """Return a stretch by CVODES; where its margin was least so far, it is looked at once more, and closer."""
+        compiled, tolerance = self.compiled, self.problem.tolerance
+
+        def stretch(instants: Array, begun: Begun) -> Stretch:
+            rhs, stepper = compiled.rhs, compiled.fixed_step
+            return smooth_stretch(rhs, self.x, u, self.p, instants, tolerance, stepper, begun)
+
+        whole = stretch(after, begun)
+        time = compiled.loop.witness.memory.slices["least_margin_time"]
+        least = float(whole.watched[time][0]) - begun.watched.time
+        if whole.failure or least <= 0:
+            return whole
+        seen = begun._replace(watched=begun.watched._replace(memory=whole.watched))
+        closer = stretch(around(least, float(after[-1])), seen)
+        return whole if closer.failure else whole._replace(watched=closer.watched)
 
     def _potential(self, motion: Motion, clock: float) -> float:
         """Return U [J] at the present state, with the reference at `clock` of `motion`."""
