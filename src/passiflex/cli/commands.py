@@ -180,10 +180,13 @@ def robots() -> int:
 
 
 def _wrong_books(run: Run, result: Audit) -> str:
-    """Return by how much the books of the law are wrong."""
+    """Return by how much the books of the law are wrong, and what they do not know."""
+    from passiflex.simulation.unbooked import NOTHING
+
     if run.sampled and run.has_tank:
         return f"the tank claims up to {result.books_error:.3g} J beyond what is there"
-    return f"the law's own books are wrong by up to {result.books_error:.3g} J ({result.unbooked})"
+    why = f" ({result.unbooked})" if result.unbooked != NOTHING else ""
+    return f"the law's own books are wrong by up to {result.books_error:.3g} J{why}"
 
 
 def _print_control(run: Run) -> None:

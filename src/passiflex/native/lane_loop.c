@@ -88,26 +88,34 @@ static void lane_plan(lane_clock* clock, const double* line, double period, doub
     clock->done = 0;
 }
 
-/* Let the watch see a sample of all lanes, or a step of those that are `moving`. */
-static void lane_look(const passiflex_lane_run* r, const lanes* held, lanes time)
+/* Let the watch see a sample, or a step, of those lanes that are seen. */
+static void lane_look(const passiflex_lane_run* r, const lanes* held, lanes time, lane_bits seen)
 {
 #if N_M > 0
     lanes next[N_M];
     LOOK(r->w, &time, r->y, held, r->c, r->z, r->p_watch, next);
-    memcpy(r->w, next, N_M * sizeof(lanes));
+    for (int i = 0; i < N_M; i++) r->w[i] = where(seen, next[i], r->w[i]);
 #endif
 }
 
-static void lane_glance(const passiflex_lane_run* r, lanes time, lane_bits moving)
+static void lane_glance(const passiflex_lane_run* r, lanes time, lane_bits seen)
 {
 #if N_M > 0
     lanes next[N_M];
     GLANCE(r->w, &time, r->y, r->p_watch, next);
-    for (int i = 0; i < N_M; i++) r->w[i] = where(moving, next[i], r->w[i]);
+    for (int i = 0; i < N_M; i++) r->w[i] = where(seen, next[i], r->w[i]);
 #endif
 }
 
-static void lane_period(const passiflex_lane_run* r, lanes* input, double start)
+/* The lanes whose numbers are all finite: what has left them is not watched any more. */
+static lane_bits lane_whole(const lanes* y)
+{
+    lane_bits whole = all_bits(-1);
+    for (int i = 0; i < N_Y; i++) EACH_LANE if (!isfinite(LANE(y[i], l))) LANE(whole, l) = 0;
+    return whole;
+}
+
+static void lane_period(const passiflex_lane_run* r, lanes* input, double start, lane_bits whole)
 {
     lane_clock clock[LANES];
     EACH_LANE
@@ -128,7 +136,7 @@ static void lane_period(const passiflex_lane_run* r, lanes* input, double start)
         }
         if (!some) return;
         lane_step(r->y, input, r->p_plant, h, moving);
-        lane_glance(r, time, moving);
+        lane_glance(r, time, moving & whole);
         EACH_LANE if (!clock[l].arrived && --clock[l].left == 0)
         {
             double* line = r->line + l * LINE;
@@ -151,6 +159,7 @@ LANE_EXPORT void passiflex_lane_loop(const passiflex_lane_run* r)
     lanes seen[N_SEEN], none = all_lanes(0.0); /* NaN once a number was not finite */
     const long long* change = r->changes;
     lanes* out = r->out;
+    lane_bits whole = lane_whole(r->y);
     EACH_LANE r->completed[l] = r->n_rows, r->whole[l] = 0;
     for (long long k = 0; k < r->n_rows; k++) {
         const double* timing = r->timing + k * 2 * LANES;
@@ -169,7 +178,7 @@ LANE_EXPORT void passiflex_lane_loop(const passiflex_lane_run* r)
             if (timing[LANES + l] != 0.0) lane_send(r->line + l * LINE, command, l, timing[l]);
             lane_receive(r->line + l * LINE, input, l, 0.0, r->period);
         }
-        lane_look(r, input, time);
+        lane_look(r, input, time, whole);
         if (k % r->record_every == 0) {
             lanes* s = seen;
             memcpy(s, r->y, N_Y * sizeof(lanes)), s += N_Y;
@@ -183,17 +192,16 @@ LANE_EXPORT void passiflex_lane_loop(const passiflex_lane_run* r)
             EACH_LANE r->whole[l] += LANE(none, l) == 0.0;
         }
         if (k >= r->steps) break;
-        lane_period(r, input, (double)(r->first + k) * r->period);
+        lane_period(r, input, (double)(r->first + k) * r->period, whole);
         int alive = 0;
+        whole = lane_whole(r->y);
         EACH_LANE
         {
             double* line = r->line + l * LINE;
             for (long long i = 0; i < (long long)line[0]; i++) line[1 + N_U + i * ENTRY] -= r->period;
             if (r->completed[l] < r->n_rows) continue;
-            int finite = 1;
-            for (int i = 0; i < N_Y; i++) finite &= isfinite(LANE(r->y[i], l)) != 0;
-            if (!finite) r->completed[l] = k;
-            alive |= finite;
+            if (!LANE(whole, l)) r->completed[l] = k;
+            alive |= LANE(whole, l) != 0;
         }
         if (!alive) return;
     }

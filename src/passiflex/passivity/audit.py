@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Literal
 
@@ -127,4 +126,4 @@ def audit_if_possible(run: Signals) -> Audit | None:
         result = audit(run)
     except KeyError:  # how a run says that it has no signal of this name
         return None
-    return result if math.isfinite(result.margin) else None
+    return result if np.isfinite([result.margin, *available_energy(run)]).all() else None
