@@ -92,11 +92,8 @@ def test_nobody_looks_unless_the_watch_is_told_its_numbers(loop):
 @pytest.mark.parametrize("width", [1, 4, 8])
 def test_each_lane_is_seen_as_it_is_alone(width, library):
     """Other delays, steps and missed periods beside it; the second piece goes on where the first ended."""
-    lanes, held = (
-        LaneLoop(functions(cart())._replace(watch=watch()), width),
-        HeldLoop(cart(), regulator(), library, watch()),
-    )
-    robots = [replace(r, begin=r.begin) for r in ROBOTS[:width]]
+    lanes = LaneLoop(functions(cart())._replace(watch=watch()), width)
+    held, robots = HeldLoop(cart(), regulator(), library, watch()), ROBOTS[:width]
     state = lanes.start([held.start(r.begin, np.zeros(3), FIRST_COMMAND) for r in robots])
     drawn, timing = (np.stack(part, axis=-1) for part in zip(*(r.chance(40) for r in robots), strict=True))
     changes = [Change(k, lane, numbers) for lane, r in enumerate(robots) for k, numbers in r.told()]
@@ -146,9 +143,8 @@ def stepper(request, tmp_path_factory):
 def test_fixed_steps_are_seen_at_the_start_and_at_every_end(stepper, refine):
     """x₀ = t by u = (1, 0): the sum of all that is seen is known in closed form, the times with it."""
     held, begin = np.tile([1.0, 0.0], (3, 1)), 10.0
-    done = stepper.advance(
-        [0, 0], [0], held, [], 0.4, 4, refine=refine, watched=Watched(np.zeros(3), np.array([2.0]), begin)
-    )
+    watched = Watched(np.zeros(3), np.array([2.0]), begin)
+    done = stepper.advance([0, 0], [0], held, [], 0.4, 4, refine=refine, watched=watched)
     lengths = [0.1] * 4 if refine is None else [0.1 / 3] * 6 + [0.1] * 2
     times = np.concatenate([[0.0], np.cumsum(np.tile(lengths, 3))])
     seen = times + times**2 / 2 + 1 + 2
