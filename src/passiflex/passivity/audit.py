@@ -16,7 +16,7 @@ from passiflex.passivity.ledger import (
     motor_side_storage,
     robot_balance,
 )
-from passiflex.simulation.unbooked import listed
+from passiflex.simulation.unbooked import SHAPED, listed
 from passiflex.simulation.witness import TERMS
 
 Verdict = Literal["passive", "violated", "inconclusive"]
@@ -114,9 +114,12 @@ def _remedy(run: Signals) -> str:
     """Return what helps against an overdraft: of what there is to be changed."""
     if run.sampled and run.has_tank:
         return "see `passiflex limits` for the gains that hold at this rate"
-    ways = ["lower the gains"]
+    shapes = run.unbooked.startswith(SHAPED)
+    ways = ["take a larger target_inertia"] if shapes else []
+    ways += ["lower the gains"]
     ways += ["give the tank more to start with"] if run.has_tank else []
     ways += ["correct the law's model"] if "model error" in run.unbooked else []
+    ways += ["take the impedance law"] if shapes else []
     return listed(ways, "or")
 
 

@@ -84,7 +84,7 @@ def passed_limits(run: Run) -> tuple[PassedLimit, ...]:
         i = reached.joint - 1
         if not (0 <= i < excess.size and np.isfinite(reached.time)):
             continue
-        others = tuple(int(j) + 1 for j in np.flatnonzero(excess > 0) if j != i)
+        others = tuple(int(j) + 1 for j in np.flatnonzero(excess > _rounding(kind, upper)) if j != i)
         limit = float(lower[i] if below[i] > above[i] and kind == "position" else upper[i])
         unit = _unit(run, i, kind)
         found.append(
@@ -94,11 +94,16 @@ def passed_limits(run: Run) -> tuple[PassedLimit, ...]:
 
 
 def _ends(run: Run, kind: str) -> tuple[Array, Array]:
-    """Return the least and the largest value that the robot allows (n,), with room for rounding."""
+    """Return the least and the largest value that the robot allows (n,)."""
     if kind == "position":
         return run["lower_position_limit"], run["upper_position_limit"]
-    most = run["velocity_limit" if kind == "speed" else "torque_limit"] * (1 + SLACK)
+    most = run["velocity_limit" if kind == "speed" else "torque_limit"]
     return -most, most
+
+
+def _rounding(kind: str, upper: Array) -> Array:
+    """Return by how much rounding may pass a limit (n,): a motor at its limit gives it to the last digits."""
+    return np.zeros_like(upper) if kind == "position" else SLACK * upper
 
 
 def _reached(run: Run, kind: str, lower: Array, upper: Array) -> _Reached:
@@ -108,7 +113,8 @@ def _reached(run: Run, kind: str, lower: Array, upper: Array) -> _Reached:
         low = run["lowest_q"] if kind == "position" else -high
         return _Reached(low, high, int(run[f"{kind}_joint"]), float(run[f"{kind}_time"]), every_step=True)
     values = run[{"position": "q", "speed": "dq", "torque": "tau_m"}[kind]]
-    outside = (values < lower) | (values > upper)
+    room = _rounding(kind, upper)
+    outside = (values < lower - room) | (values > upper + room)
     row = int(np.argmax(outside.any(axis=1)))
     joint = int(np.argmax(outside[row])) + 1 if outside.any() else 0
     low, high = np.nanmin(values, axis=0), np.nanmax(values, axis=0)

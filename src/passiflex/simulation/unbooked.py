@@ -13,6 +13,8 @@ UNKNOWN = "model error and noise"
 NOTHING = "the law's own books"
 """Where everything is as the law believes."""
 
+SHAPED = "inertia shaped by the law"
+
 
 def unbooked(problem: Problem) -> str:
     """Return what the law's books miss: only what is there.
@@ -24,7 +26,7 @@ def unbooked(problem: Problem) -> str:
     causes = []
     if rigid:
         blind = s is not None and isinstance(s.controller.external, NoTorque)
-        causes.append("inertia shaped by the law" + " without force sensing" * blind)
+        causes.append(SHAPED + " without force sensing" * blind)
     elif s is not None:
         causes.append("sampling")
     if not np.array_equal(problem.plant, problem.model):
