@@ -28,7 +28,8 @@ CHECK, FIRST_CHECK, MOST_CHECKS = 0.5e-3, 1e-6, 100_000
 """A smooth stretch is looked at so often [s], after an event from a microsecond on, each time twice as late; a stretch
 of more than so many such intervals, so many times."""
 CLOSER = 64
-"""Looks between the two that are next to an extremum: what h²/8 of its second derivative hides is then 1e-3 as much."""
+"""Looks at what is between the two that are next to an extremum: what h²/8 of its second derivative hides is then 1e-3
+as much."""
 SLOW_POLE = 1e4
 """Up to this pole [1/s] Runge-Kutta resolves a run faster than CVODES, which crawls along undamped modes."""
 
@@ -88,9 +89,9 @@ def smooth_stretch(
     return Stretch(states[asked], energies[asked], failure, watched)
 
 
-def around(time: float, end: float) -> Array:
-    """Return instants around one of a smooth stretch that was looked at [s], from which its extremum is seen."""
-    return np.linspace(max(time - CHECK, FIRST_CHECK), min(time + CHECK, end), CLOSER)
+def around(time: float, apart: float, end: float) -> Array:
+    """Return instants around one of a stretch [s] that was looked at so far apart; its extremum is between them."""
+    return np.linspace(max(time - apart, FIRST_CHECK), min(time + apart, end), CLOSER)
 
 
 def _checked(instants: Array) -> tuple[Array, NDArray[np.intp]]:

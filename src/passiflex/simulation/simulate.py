@@ -10,9 +10,11 @@ from numpy.typing import NDArray
 from passiflex.control.tank import jump_cost
 from passiflex.errors import SimulationError
 from passiflex.native import Watched, fastest_pole
+from passiflex.native.stability import STABILITY_LIMIT
 from passiflex.simulation.closed_loop import ENERGIES
 from passiflex.simulation.compiled import CompiledLoop, compiled_loop
 from passiflex.simulation.integrate import (
+    CHECK,
     RESOLVED,
     SAFETY,
     SLOW_POLE,
@@ -183,30 +185,36 @@ class _Simulation:
             rows, share = np.round(after / lasts).astype(int), share_for(SAFETY, problem.tolerance)
             return held_stretch(stepper, self.x, held, self.p, lasts, rows, share, begun)
         pole = fastest_pole(stepper.rhs, self.x, u, self.p)
-        if pole <= SLOW_POLE:
-            share = share_for(RESOLVED, problem.tolerance)
-            return resolved_stretch(stepper, self.x, u, self.p, after, pole, share, begun)
-        smooth = self._smooth(u, after, begun)
-        if not smooth.failure:
-            return smooth
-        # A run that CVODES gives up on is followed to its end by steps that are merely stable.
-        return resolved_stretch(stepper, self.x, u, self.p, after, pole, SAFETY, begun)
+        share = share_for(RESOLVED, problem.tolerance)
 
-    def _smooth(self, u: Array, after: Array, begun: Begun) -> Stretch:
-        """Return a stretch by CVODES; where its margin was least so far, it is looked at once more, and closer."""
-        compiled, tolerance = self.compiled, self.problem.tolerance
+        def resolved(instants: Array, begun: Begun, share: float = share) -> Stretch:
+            return resolved_stretch(stepper, self.x, u, self.p, instants, pole, share, begun)
 
-        def stretch(instants: Array, begun: Begun) -> Stretch:
-            rhs, stepper = compiled.rhs, compiled.fixed_step
+        def smooth(instants: Array, begun: Begun) -> Stretch:
+            rhs, tolerance = self.compiled.rhs, problem.tolerance
             return smooth_stretch(rhs, self.x, u, self.p, instants, tolerance, stepper, begun)
 
+        if pole <= SLOW_POLE:
+            apart = share * STABILITY_LIMIT / max(pole, 1 / problem.duration)
+            return self._looked_at(resolved, after, begun, apart)
+        stretch = self._looked_at(smooth, after, begun, CHECK)
+        # A run that CVODES gives up on is followed to its end by steps that are merely stable.
+        return resolved(after, begun, SAFETY) if stretch.failure else stretch
+
+    def _looked_at(
+        self, stretch: Callable[[Array, Begun], Stretch], after: Array, begun: Begun, apart: float
+    ) -> Stretch:
+        """Return a stretch; where its margin was least so far, it is looked at once more, and closer.
+
+        `apart` are the looks of the first time [s].
+        """
         whole = stretch(after, begun)
-        time = compiled.loop.witness.memory.slices["least_margin_time"]
+        time = self.compiled.loop.witness.memory.slices["least_margin_time"]
         least = float(whole.watched[time][0]) - begun.watched.time
         if whole.failure or least <= 0:
             return whole
         seen = begun._replace(watched=begun.watched._replace(memory=whole.watched))
-        closer = stretch(around(least, float(after[-1])), seen)
+        closer = stretch(around(least, apart, float(after[-1])), seen)
         return whole if closer.failure else whole._replace(watched=closer.watched)
 
     def _potential(self, motion: Motion, clock: float) -> float:
