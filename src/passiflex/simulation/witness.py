@@ -178,7 +178,11 @@ class Witness:
             "least_margin_term": cs.if_else(cs.logic_and(lower, w.noted), term, w.least_margin_term),
             "overdraft_term": cs.if_else(over, term, w.overdraft_term),
         }
-        known = {"noted": 1, "looked": now.time, "largest_books_error": cs.fmax(w.largest_books_error, wrong)}
+        known = {
+            "noted": 1,
+            "looked": cs.fmax(w.looked, now.time),
+            "largest_books_error": cs.fmax(w.largest_books_error, wrong),
+        }
         if now.latched is not None:
             fallback = cs.if_else(first, np.inf, w.fallback_time)
             known["fallback_time"] = cs.if_else(now.latched > 0, cs.fmin(fallback, now.time), fallback)
