@@ -49,7 +49,7 @@ class PassedLimit(NamedTuple):
     def __str__(self) -> str:
         """Return the sentence."""
         said = WORDS[self.kind].format(self.joint)
-        by = f"{said}, {self.limit:.4g} {self.unit}, first at {self.time:.4g} s, by {self.most:.3g} {self.unit} at most"
+        by = f"{said}, {self.limit:.4g} {self.unit}, first at {self.time:.4g} s, by {self.most:.4g} {self.unit} at most"
         who = "motor" if self.kind == "torque" else "joint"
         verb = f"so does {who}" if len(self.others) == 1 else f"so do {who}s"
         also = f"; {verb} {listed([str(joint) for joint in self.others])}" if self.others else ""
