@@ -8,6 +8,7 @@ import numpy as np
 import yaml
 
 from passiflex.simulation import Run, Scenario, parse_scenario, simulate
+from passiflex.simulation.sound import NOTED
 
 PERIOD = 1e-3
 PLAIN = """\
@@ -96,3 +97,8 @@ def books(run: Run) -> np.ndarray:
     """Return T + S + Σw + Σspilled [J], constant for the port tank, over time."""
     terms = ("tank_energy", "law_storage", "measured_port_energy", "spilled_energy")
     return np.sum([run[term] for term in terms], axis=0)
+
+
+def by_rows(run: Run) -> Run:
+    """Return the run as a file of before has it: nothing was noted between its rows."""
+    return Run(run.data.drop_vars([name for name in NOTED if name in run.data]))

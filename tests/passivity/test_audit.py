@@ -22,7 +22,7 @@ from passiflex.passivity import (
 )
 from passiflex.simulation import Run, parse_scenario, simulate
 from passiflex.studies import shipped_scenario
-from worlds import planar_text
+from worlds import by_rows, planar_text
 
 PLANAR = planar_text(reference=None, duration=1)
 
@@ -69,8 +69,8 @@ def fig3() -> Run:
 
 
 def with_energy(original: Run, **added: Any) -> Run:
-    """Return a run with energy added to some of its signals, one number or one per row."""
-    data = original.data.copy(deep=True)
+    """Return a run with energy added to some of its signals, one number or one per row; its rows are all there is."""
+    data = by_rows(original).data.copy(deep=True)
     for name, energy in added.items():
         signal = f"{name}_energy" if f"{name}_energy" in data else name
         data[signal] = data[signal].copy(data=data[signal].to_numpy() + energy)
@@ -168,7 +168,8 @@ def test_a_law_that_ignores_the_elasticity_is_violated() -> None:
     assert result.margin < -1
     assert result.overdraft == -result.margin
     assert 0.2 < result.time < 0.4
-    assert result.remedy == "lower the gains, give the tank more to start with, or correct the law's model"
+    # There is neither a tank nor a wrong model.
+    assert result.remedy == "take a larger target_inertia, lower the gains or take the impedance law"
     # It is no matter of integration: the links' balance closes a million times better.
     assert result.integration_error < 1e-6 * result.overdraft
 
@@ -182,7 +183,8 @@ def test_a_run_with_an_absurd_model_is_not_passive() -> None:
     }
     result = audit(run(RIGID, law=law, model_errors={"link_inertia": 50}, reference=STEP, duration=3))
     assert result.verdict == "violated"
-    assert result.term == "model error and noise"
+    assert result.term == "inertia shaped by the law and model error"
+    assert "lower the gains, correct the law's model or take the impedance law" in result.remedy
 
 
 def test_an_arm_that_sags_is_not_active() -> None:
@@ -246,10 +248,10 @@ ENERGY = 5.0
 DRAINS: dict[str, dict[str, float]] = {
     "motion of the links": {"link_kinetic": 1, "tank": -1},
     "work on the environment": {"external": -1, "tank": -1},
-    "model error and noise": {"link_kinetic": 1, "tank": 1},
+    "the law's own books": {"link_kinetic": 1, "tank": 1},
     "moving reference": {"link_kinetic": 0.5, "external": -0.5, "reference": 1},
 }
-"""Where 1 J through the joints goes; the books of the links always close, the law's but for the model error."""
+"""Where 1 J through the joints goes; the books of the links always close, the law's but for what they miss."""
 
 
 @pytest.mark.parametrize("term", DRAINS)
@@ -334,11 +336,10 @@ def test_the_balances_come_with_the_verdict() -> None:
     result = audit(moving())
     assert [b.name for b in result.balances] == ["robot", "links", "law"]
     robot, links, law = result.balances
-    assert (robot.worst, links.worst, law.worst) == (
-        result.ledger_residual,
-        result.integration_error,
-        result.books_error,
-    )
+    assert robot.worst == result.ledger_residual
+    # The errors are those of all steps, of which the rows are some.
+    assert links.worst <= result.integration_error < 10 * links.worst
+    assert law.worst <= result.books_error < 10 * law.worst
 
 
 @pytest.mark.parametrize(

@@ -9,8 +9,9 @@ import pytest
 import yaml
 
 from passiflex.reports.facts import facts, made_by, shown_configuration
+from passiflex.simulation import Run, passed_limits
 from reports.pages import baseline, changed, continuous, sampled
-from worlds import world
+from worlds import by_rows, world
 
 POSE = {
     "task": "pose",
@@ -124,6 +125,15 @@ def test_without_a_scenario_the_attributes_say_what_they_can(make, control: str,
 def test_a_run_that_ended_early_says_when() -> None:
     run = changed(sampled(), duration=2.0, failure="it left the numbers")
     assert dict(facts(run, None))["duration"] == "0.6 s of 2 s: it left the numbers"
+
+
+def test_a_limit_that_was_passed_is_among_the_facts() -> None:
+    assert "limit passed" not in dict(facts(continuous(), None))
+    data = by_rows(continuous()).data
+    slow = Run(data.assign(velocity_limit=data["velocity_limit"] * 0 + 1e-3))
+    (passed,) = passed_limits(slow)
+    assert dict(facts(slow, None))["limit passed"] == str(passed)
+    assert str(passed).startswith("joint ")
 
 
 def test_who_made_it() -> None:

@@ -35,9 +35,10 @@ def expressions(arm: SerialArm) -> cs.Function:
             cs.gradient(arm.potential_energy(q, m), q),
             arm.coriolis_matrix(q, dq, m),
             cs.reshape(cs.jtimes(cs.vec(M), q, dq), arm.n, arm.n),
+            arm.kinetic_energy(q, dq, m),
         ],
         ["q", "dq", "m"],
-        ["M", "Cdq", "g", "V", "p", "R", "J", "grad_V", "C", "dM"],
+        ["M", "Cdq", "g", "V", "p", "R", "J", "grad_V", "C", "dM", "E"],
     )
 
 
@@ -66,6 +67,7 @@ def check_against_pinocchio(chain: SerialChain, seed: int) -> None:
         ours["Cdq"], pin.nonLinearEffects(model, data, q, dq) - pin.computeGeneralizedGravity(model, data, q)
     )
     close(ours["V"], np.array(pin.computePotentialEnergy(model, data, q)))
+    close(ours["E"], np.array(pin.computeKineticEnergy(model, data, q, dq)))
     pin.framesForwardKinematics(model, data, q)
     close(ours["p"], data.oMf[frame].translation)
     close(ours["R"], data.oMf[frame].rotation)

@@ -82,7 +82,7 @@ SIGNALS = (
     "external_energy", "motor_energy", "joint_energy", "joint_loss_energy", "friction_energy", "reference_energy",
     "external_power", "motor_power", "joint_power", "joint_loss_power", "friction_power",
     "tank_energy", "law_storage", "measured_port_energy", "spilled_energy",
-    "compensated_energy", "shaped_kinetic_energy", "shaped_spring_energy", "cartesian_spring_energy",
+    "carried_energy", "compensated_energy", "shaped_kinetic_energy", "shaped_spring_energy", "cartesian_spring_energy",
     "gravity_storage", "governed_time", "latched", "read_time", "measurement_bound",
 )  # fmt: skip
 """What is recorded of a sampled run for it."""
@@ -90,8 +90,13 @@ SIGNALS = (
 
 def measures(problem: Problem, window: StepWindow | None, run: Signals) -> dict[str, float | str]:
     """Return verdict, what decided it, why the run failed, and the numbers of `MEASURES`."""
-    result, robot = audit(run), problem.law.robot
-    torque, q, dq, end = np.abs(run["tau_m"]), run["q"], np.abs(run["dq"]), run.time[-1]
+    result, robot, end = audit(run), problem.law.robot, run.time[-1]
+    torque = _reached(run, "highest_torque", np.abs(run["tau_m"]).max(axis=0))
+    speed = _reached(run, "highest_speed", np.abs(run["dq"]).max(axis=0))
+    lowest, highest = (
+        _reached(run, "lowest_q", run["q"].min(axis=0)),
+        _reached(run, "highest_q", run["q"].max(axis=0)),
+    )
     low, high = robot.position_limit.T
     numbers: dict[str, float | str] = {
         "verdict": result.verdict,
@@ -109,8 +114,8 @@ def measures(problem: Problem, window: StepWindow | None, run: Signals) -> dict[
         **_governor(run),
         "torque_peak": torque.max(),
         "torque_share": (torque / robot.torque_limit).max(),
-        "velocity_share": (dq / robot.velocity_limit).max(),
-        "joint_limit_margin": min((q - low).min(), (high - q).min()),
+        "velocity_share": (speed / robot.velocity_limit).max(),
+        "joint_limit_margin": min((lowest - low).min(), (high - highest).min()),
         "tracking_rms": rms(np.linalg.norm(run["position"] - run["desired_position"], axis=1)),
         **_response(problem, window, run),
         "end_time": end,
@@ -118,13 +123,22 @@ def measures(problem: Problem, window: StepWindow | None, run: Signals) -> dict[
     return {name: v if isinstance(v, str) else float(v) for name, v in numbers.items()}
 
 
+def _reached(run: Signals, noted: str, rows: Array) -> Array:
+    """Return how far each joint went (n,): as the loop noted it, or else by the rows."""
+    try:
+        return run[noted]
+    except KeyError:
+        return rows
+
+
 def _governor(run: Signals) -> dict[str, float]:
     if not run.sampled:
         return {"governed_share": math.nan, "fell_back_at": math.nan}
     latched, end = run["latched"] > 0, run.time[-1]
+    fell = _reached(run, "fallback_time", np.array(run.time[latched.argmax()] if latched.any() else np.inf))
     return {
         "governed_share": run["governed_time"][-1] / end if end else 0.0,
-        "fell_back_at": run.time[latched.argmax()] if latched.any() else math.nan,
+        "fell_back_at": float(fell) if np.isfinite(fell) else math.nan,
     }
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -11,6 +12,7 @@ from rich.table import Table
 from passiflex.cli.terminal import app, console, progress_lines, timed
 
 if TYPE_CHECKING:
+    from passiflex.passivity import Audit
     from passiflex.simulation import Run
 
 EXIT = {"passive": 0, "violated": 1, "inconclusive": 2}
@@ -59,6 +61,7 @@ def simulate(
     from passiflex.files import require_writable
     from passiflex.simulation import load_scenario, resolve, simulate_problem
     from passiflex.simulation.cautions import cautions
+    from passiflex.simulation.passed_limits import passed_limits
 
     with timed():
         with progress_lines() as report:
@@ -72,6 +75,8 @@ def simulate(
             run = simulate_problem(problem)
         if run.failure:
             console.print(f"the run ended early, at {run.time[-1]:g} s of {read.duration:g} s: {run.failure}")
+        for passed in passed_limits(run):
+            console.print(f"{passed}", markup=False)
         console.print(f"wrote {run.save(out)}")
     return 2 if run.failure else 0
 
@@ -80,6 +85,7 @@ def simulate(
 def audit(run: Path) -> int:
     """Audit a run: exit status 0 passive, 1 violated, 2 inconclusive or not usable."""
     from passiflex.passivity import audit as audit_run
+    from passiflex.simulation.passed_limits import passed_limits
     from passiflex.simulation.run import Run
     from passiflex.simulation.run_file import remarks
 
@@ -100,15 +106,14 @@ def audit(run: Path) -> int:
     decided = "least margin" if result.verdict == "passive" else "decided"
     console.print(f"{decided} at {result.time:g} s, most of it taken by: {result.term}")
     console.print(f"margin: {result.margin:.6g} J, integration error {result.integration_error:.1e} J")
+    if not result.every_step:
+        console.print("judged by the rows of the file alone: what happened between them was not noted")
     if result.books_error > max(10 * result.integration_error, 1e-6):
-        wrong = (
-            "tank claims up to {:.3g} J beyond what is there"
-            if read.sampled
-            else ("law's own books are wrong by up to {:.3g} J (model error or noise)")
-        )
-        console.print("the " + wrong.format(result.books_error))
+        console.print(_wrong_books(read, result), markup=False)
     if read.sampled:
         _print_control(read)
+    for passed in passed_limits(read):
+        console.print(f"{passed}", markup=False)
     if result.verdict != "passive":
         console.print(f"remedy: {result.remedy}")
     return EXIT[result.verdict]
@@ -174,13 +179,25 @@ def robots() -> int:
     return 0
 
 
+def _wrong_books(run: Run, result: Audit) -> str:
+    """Return by how much the books of the law are wrong, and what they do not know."""
+    from passiflex.simulation.unbooked import NOTHING
+
+    if run.sampled and run.has_tank:
+        return f"the tank claims up to {result.books_error:.3g} J beyond what is there"
+    why = f" ({result.unbooked})" if result.unbooked != NOTHING else ""
+    return f"the law's own books are wrong by up to {result.books_error:.3g} J{why}"
+
+
 def _print_control(run: Run) -> None:
     """Print what governor and fallback did."""
     governed, latched = run["governed_time"][-1], run["latched"] > 0
     if governed > 0:
         console.print(f"the governor held the reference back for {governed:.3g} s")
-    if latched.any():
-        console.print(f"the law fell back at {run.time[latched.argmax()]:.4g} s and held the pose it was in")
+    noted = float(run["fallback_time"]) if "fallback_time" in run.data else math.inf
+    if latched.any() or math.isfinite(noted):
+        fell = noted if math.isfinite(noted) else run.time[latched.argmax()]
+        console.print(f"the law fell back at {fell:.4g} s and held the pose it was in")
     if run["faults"][-1] > 0:
         console.print(f"{run['faults'][-1]:.0f} measurements were not finite, and changed nothing")
     if "measurement_bound" in run.data and run.time[-1] > 0:

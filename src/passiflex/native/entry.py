@@ -4,12 +4,32 @@ from __future__ import annotations
 
 import ctypes
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from passiflex.errors import CompilerError
+
+
+class Callable(ctypes.Structure):
+    """A generated function with work arrays of its own, as the package's C code calls it (`passiflex_callable`)."""
+
+    _fields_ = (
+        ("function", ctypes.c_void_p),
+        ("memory", ctypes.c_int),
+        *((name, ctypes.c_void_p) for name in ("arg", "res", "iw", "w")),
+    )
+
+    @classmethod
+    def of(cls, entry: Entry) -> Self:
+        """Return the function of an entry with fresh work arrays, which live as long as it."""
+        arg, res, iw, w = entry.work()
+        made = cls(
+            entry.address, entry.memory, ctypes.addressof(arg), ctypes.addressof(res), address(iw), address(w)
+        )
+        made.kept = (arg, res, iw, w)
+        return made
 
 
 class Entry:

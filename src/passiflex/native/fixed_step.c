@@ -3,29 +3,66 @@
  * The extended state is (x, quad); quad does not act back on x. Row i of held (n_hold rows of n_u
  * numbers) is held during period i, which takes `substeps` steps of `length`; the first `refined` of
  * them are split into `split` equal ones, for what is fast after the input has jumped.
+ * watch(w, time, y, u, p_watch) -> w, if there is one, sees the start and the end of every step; the time is
+ * `begin` at the start.
  * out receives the extended state at the start and after every `record_every` periods,
- * (n_hold / record_every + 1) rows in all. scratch holds 4*(n_x + n_q) numbers;
- * arg, res, iw, w are the work arrays of rhs. Nothing is allocated here.
+ * (n_hold / record_every + 1) rows in all. scratch holds 4*(n_x + n_q) + n_m numbers. Nothing is allocated here.
  * Returns n_hold, or the first period after which a number is not finite (or in which rhs failed);
  * the rows from there on are NaN. */
-typedef int (*passiflex_rhs)(const double** arg, double** res, long long* iw, double* w, int memory);
+typedef struct {
+    int (*f)(const double** arg, double** res, long long* iw, double* w, int memory);
+    int memory;
+    const double** arg;
+    double** res;
+    long long* iw;
+    double* w;
+} passiflex_callable;
+
+/* Show a watch one instant; w is n_m numbers, next has room for as many. */
+static int passiflex_look(
+    const passiflex_callable* watch, long long n_m, double* w, double* next, double time,
+    const double* y, const double* u, const double* p)
+{
+    if (!watch) return 0;
+    watch->arg[0] = w;
+    watch->arg[1] = &time;
+    watch->arg[2] = y;
+    watch->arg[3] = u;
+    watch->arg[4] = p;
+    watch->res[0] = next;
+    if (watch->f(watch->arg, watch->res, watch->iw, watch->w, watch->memory)) return 1;
+    for (long long i = 0; i < n_m; i++) w[i] = next[i];
+    return 0;
+}
+
+/* Show a watch n_rows instants in a row: time i and row i of y, n numbers each. */
+CASADI_SYMBOL_EXPORT long long passiflex_watch_rows(
+    const passiflex_callable* watch, long long n_m, long long n, double* w, double* next,
+    long long n_rows, const double* time, const double* y, const double* u, const double* p)
+{
+    for (long long i = 0; i < n_rows; i++)
+        if (passiflex_look(watch, n_m, w, next, time[i], y + i * n, u, p)) return i;
+    return n_rows;
+}
 
 CASADI_SYMBOL_EXPORT long long passiflex_rk4(
-    passiflex_rhs rhs, int memory, long long n_x, long long n_q, long long n_u,
-    const double* start, const double* held, const double* p,
+    const passiflex_callable* rhs, const passiflex_callable* watch,
+    long long n_m, long long n_x, long long n_q, long long n_u,
+    const double* start, const double* held, const double* p, double* w, const double* p_watch, double begin,
     long long n_hold, long long substeps, double length, long long refined, long long split,
-    long long record_every, double* out,
-    const double** arg, double** res, long long* iw, double* w, double* scratch)
+    long long record_every, double* out, double* scratch)
 {
     static const double node[4] = {0.0, 0.5, 0.5, 1.0};
     static const double weight[4] = {1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0};
     const long long n = n_x + n_q;
-    double *y = scratch, *stage = y + n, *slope = stage + n, *sum = slope + n;
+    double *y = scratch, *stage = y + n, *slope = stage + n, *sum = slope + n, *next = sum + n;
     double *end = out + (n_hold / record_every + 1) * n;
     long long period;
 
     for (long long i = 0; i < n; i++) *out++ = y[i] = start[i];
+    if (n_hold && passiflex_look(watch, n_m, w, next, begin, y, held, p_watch)) n_hold = 0;
     for (period = 0; period < n_hold; period++) {
+        const double *u = held + period * n_u, first = begin + period * (substeps * length);
         int bad = 0;
         long long fine = refined < substeps ? refined : substeps;
         long long steps = substeps + fine * (split - 1);
@@ -34,15 +71,17 @@ CASADI_SYMBOL_EXPORT long long passiflex_rk4(
             for (long long i = 0; i < n; i++) sum[i] = 0.0;
             for (int s = 0; s < 4 && !bad; s++) {
                 for (long long i = 0; i < n_x; i++) stage[i] = s ? y[i] + h * node[s] * slope[i] : y[i];
-                arg[0] = stage;
-                arg[1] = held + period * n_u;
-                arg[2] = p;
-                res[0] = slope;
-                res[1] = slope + n_x;
-                bad = rhs(arg, res, iw, w, memory);
+                rhs->arg[0] = stage;
+                rhs->arg[1] = u;
+                rhs->arg[2] = p;
+                rhs->res[0] = slope;
+                rhs->res[1] = slope + n_x;
+                bad = rhs->f(rhs->arg, rhs->res, rhs->iw, rhs->w, rhs->memory);
                 for (long long i = 0; i < n; i++) sum[i] += weight[s] * slope[i];
             }
             for (long long i = 0; i < n; i++) y[i] += h * sum[i];
+            double t = step < fine * split ? (step + 1) * h : (fine + (step + 1 - fine * split)) * h;
+            bad |= passiflex_look(watch, n_m, w, next, first + t, y, u, p_watch);
         }
         for (long long i = 0; i < n; i++) bad |= !isfinite(y[i]); /* once lost, a number never becomes finite again */
         if (bad) break;

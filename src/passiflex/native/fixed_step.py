@@ -17,32 +17,45 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from passiflex.errors import SizeError, ValueRangeError
-from passiflex.native.entry import Entry, address
+from passiflex.native.entry import Callable, Entry, address
 from passiflex.native.function import NativeFunction
 from passiflex.native.library import c_source
 
 DRIVER = c_source("fixed_step.c")
 """The C text that `compile_functions` must append to a library that `FixedStep` is to use."""
 
-STABILITY_LIMIT = 2.78
-"""Largest h·|λ| at which Runge-Kutta 4 is stable (2.785 on the real, 2.828 on the imaginary axis)."""
-
 _RK4 = [
-    ctypes.c_void_p, ctypes.c_int, *[ctypes.c_longlong] * 3, *[ctypes.c_void_p] * 3,
-    *[ctypes.c_longlong] * 2, ctypes.c_double, *[ctypes.c_longlong] * 3, *[ctypes.c_void_p] * 6,
+    *[ctypes.c_void_p] * 2, *[ctypes.c_longlong] * 4, *[ctypes.c_void_p] * 5, ctypes.c_double,
+    *[ctypes.c_longlong] * 2, ctypes.c_double, *[ctypes.c_longlong] * 3, *[ctypes.c_void_p] * 2,
 ]  # fmt: skip
+_ROWS = [
+    ctypes.c_void_p,
+    *[ctypes.c_longlong] * 2,
+    *[ctypes.c_void_p] * 2,
+    ctypes.c_longlong,
+    *[ctypes.c_void_p] * 4,
+]
 
 
 class Advance(NamedTuple):
     """States and quadratures at the recorded instants, and the number of periods that were completed.
 
     `completed` below the number of periods is the index of the period in which a number ceased to be
-    finite; the rows from there on are NaN.
+    finite; the rows from there on are NaN. `watched` is what the watch remembers after it.
     """
 
     states: NDArray[np.float64]
     quads: NDArray[np.float64]
     completed: int
+    watched: NDArray[np.float64]
+
+
+class Watched(NamedTuple):
+    """What a watch remembers so far (zeros before it saw anything), its parameters, and the time now [s]."""
+
+    memory: NDArray[np.float64]
+    p: NDArray[np.float64]
+    time: float = 0.0
 
 
 class Refinement(NamedTuple):
@@ -63,6 +76,7 @@ class FixedStep:
     ----------
     rhs: The function (x, u, p) → (dx, dquad), all columns; quadratures may be empty.
     library: What `compile_functions([rhs, …], driver=DRIVER)` returned; None runs CasADi's virtual machine.
+    watch: Sees the start and the end of every step: (memory, time, (x, quad), u, p) → memory, in the library too.
 
     Raises
     ------
@@ -72,7 +86,7 @@ class FixedStep:
         If the library does not hold `rhs` or the driver.
     """
 
-    def __init__(self, rhs: cs.Function, library: Path | None = None):
+    def __init__(self, rhs: cs.Function, library: Path | None = None, watch: cs.Function | None = None):
         columns = all(rhs.size2_in(i) == 1 for i in range(rhs.n_in())) and all(
             rhs.size2_out(i) == 1 for i in range(rhs.n_out())
         )
@@ -81,11 +95,17 @@ class FixedStep:
         self.rhs = NativeFunction(rhs, library)
         self.n_x, self.n_u, self.n_p = (a.size for a in self.rhs.inputs)
         self.n_q = self.rhs.outputs[1].size
+        self.n_m: int = watch.size1_in(0) if watch is not None else 0
+        self.n_p_watch: int = watch.size1_in(4) if watch is not None else 0
         self._entry = Entry(library, rhs.name()) if library is not None else None
-        if self._entry is not None:
+        self._watch: Entry | NativeFunction | None = None
+        if self._entry is not None and library is not None:
             self._routine = self._entry.routine("passiflex_rk4", _RK4)
+            self._rows = self._entry.routine("passiflex_watch_rows", _ROWS)
+            self._watch = Entry(library, watch.name()) if watch is not None else None
         else:
             self._step = NativeFunction(step_function(rhs))
+            self._watch = NativeFunction(watch) if watch is not None else None
 
     def advance(
         self,
@@ -97,6 +117,7 @@ class FixedStep:
         substeps: int = 1,
         record_every: int = 1,
         refine: Refinement | None = None,
+        watched: Watched | None = None,
     ) -> Advance:
         """Return the motion over the periods of `held`.
 
@@ -109,6 +130,7 @@ class FixedStep:
         substeps: Steps per period, see `stable_step`.
         record_every: Periods from one recorded row to the next; row 0 is the start.
         refine: Finer steps at the start of every period; None keeps all steps equal.
+        watched: What the watch starts from, at the time of the start; None shows it nothing.
 
         Raises
         ------
@@ -129,15 +151,44 @@ class FixedStep:
                 raise ValueRangeError(name, got=count, needs="a whole number, at least 1")
         substeps, record_every = int(substeps), int(record_every)
         out = np.full((len(held) // record_every + 1, start.size), np.nan)
+        shown = self._shown(watched)
         run = self._advance_in_machine if self._entry is None else self._advance_in_c
-        completed = run(start, held, p, substeps, period / substeps, refine, record_every, out)
-        return Advance(out[:, : self.n_x], out[:, self.n_x :], completed)
+        completed = run(start, held, p, shown, substeps, period / substeps, refine, record_every, out)
+        return Advance(
+            out[:, : self.n_x], out[:, self.n_x :], completed, np.zeros(0) if shown is None else shown.memory
+        )
+
+    def _shown(self, watched: Watched | None) -> Watched | None:
+        """Return what the watch starts from, with a memory of its own to write to."""
+        if watched is None:
+            return None
+        memory = _column("memory of the watch", watched.memory, self.n_m).copy()
+        return watched._replace(
+            memory=memory, p=_column("parameters of the watch", watched.p, self.n_p_watch)
+        )
+
+    def watch_rows(
+        self, watched: Watched, time: NDArray[np.float64], y: NDArray[np.float64], u: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Return what the watch remembers after it was shown instants in a row: times (N,), (x, quad) (N, n), u."""
+        memory, p, room = watched.memory.copy(), watched.p, np.empty(self.n_m)
+        time, y = np.ascontiguousarray(time, dtype=float), np.ascontiguousarray(y, dtype=float)
+        if isinstance(self._watch, Entry):
+            self._rows(
+                ctypes.byref(Callable.of(self._watch)), self.n_m, y.shape[1], address(memory),
+                address(room), len(y), address(time), address(y), address(u), address(p),
+            )  # fmt: skip
+        elif self._watch is not None:
+            for t, row in zip(time, y, strict=True):
+                memory[:] = self._watch(memory, t, row, u, p)
+        return memory
 
     def _advance_in_c(
         self,
         start: NDArray[np.float64],
         held: NDArray[np.float64],
         p: NDArray[np.float64],
+        watched: Watched | None,
         substeps: int,
         h: float,
         refine: Refinement,
@@ -145,13 +196,16 @@ class FixedStep:
         out: NDArray[np.float64],
     ) -> int:
         assert self._entry is not None
-        arg, res, iw, w = self._entry.work()
-        scratch = np.empty(4 * start.size)
+        rhs = Callable.of(self._entry)
+        watch = None
+        if watched is not None and isinstance(self._watch, Entry):
+            watch = ctypes.byref(Callable.of(self._watch))
+        memory, p_watch, begin = watched or Watched(np.zeros(0), np.zeros(0))
+        scratch = np.empty(4 * start.size + self.n_m)
         return self._routine(
-            self._entry.address, self._entry.memory, self.n_x, self.n_q, self.n_u,
-            address(start), address(held), address(p),
-            len(held), substeps, h, refine.steps, refine.split, record_every, address(out),
-            arg, res, address(iw), address(w), address(scratch),
+            ctypes.byref(rhs), watch, self.n_m, self.n_x, self.n_q, self.n_u,
+            address(start), address(held), address(p), address(memory), address(p_watch), begin,
+            len(held), substeps, h, refine.steps, refine.split, record_every, address(out), address(scratch),
         )  # fmt: skip
 
     def _advance_in_machine(
@@ -159,6 +213,7 @@ class FixedStep:
         start: NDArray[np.float64],
         held: NDArray[np.float64],
         p: NDArray[np.float64],
+        watched: Watched | None,
         substeps: int,
         h: float,
         refine: Refinement,
@@ -170,62 +225,27 @@ class FixedStep:
         y[:], parameters[:] = start, p
         fine = min(refine.steps, substeps)
         lengths = [h / refine.split] * (fine * refine.split) + [h] * (substeps - fine)
+        ends = np.cumsum(lengths)
         out[0] = start
         for i, row in enumerate(held):
             u[:] = row
-            for length[0] in lengths:
+            if i == 0:
+                self._look(watched, 0.0, y, u)
+            for length[0], end in zip(lengths, ends, strict=True):
                 self._step.call()
                 y[:] = y_next
+                self._look(watched, i * substeps * h + end, y, u)
             if not np.isfinite(y).all():
                 return i
             if (i + 1) % record_every == 0:
                 out[(i + 1) // record_every] = y
         return len(held)
 
-
-def fastest_pole(rhs: NativeFunction, x: ArrayLike, u: ArrayLike, p: ArrayLike) -> float:
-    """Return max |λ| [1/s] of the Jacobian ∂(dx)/∂x, by central differences at (x, u, p).
-
-    Raises
-    ------
-    ValueRangeError
-        If the slope is not finite around x.
-    """
-    x = np.atleast_1d(np.asarray(x, dtype=float))
-    if x.size == 0:
-        return 0.0
-    # The step that balances truncation (h²) against rounding (ε/h).
-    h = np.cbrt(np.finfo(float).eps) * np.maximum(np.abs(x), 1.0)
-    above, below = x + np.diag(h), x - np.diag(h)
-    dx = rhs.map(np.vstack([above, below]), u, p)[0]
-    jacobian = ((dx[: x.size] - dx[x.size :]) / (np.diag(above) - np.diag(below))[:, None]).T
-    if not np.isfinite(jacobian).all():
-        raise ValueRangeError("the slope around this state is not finite", got=f"x = {x}")
-    return float(np.abs(np.linalg.eigvals(jacobian)).max())
-
-
-def stable_step(pole: float, period: float, safety: float = 0.5) -> int:
-    """Return the number of Runge-Kutta 4 steps per period with h·|λ| ≤ safety · 2.78.
-
-    Parameters
-    ----------
-    pole: |λ| of the fastest mode [1/s], see `fastest_pole`.
-    period: Length of a period [s].
-    safety: Share of the stability limit; 1 is the edge.
-
-    Raises
-    ------
-    ValueRangeError
-        For a number that is negative, zero (period, safety) or not finite.
-    """
-    for name, value, least in (
-        ("pole", pole, 0.0),
-        ("period", period, math.ulp(0)),
-        ("safety", safety, math.ulp(0)),
-    ):
-        if not (math.isfinite(value) and value >= least):
-            raise ValueRangeError(name, got=value, needs="a positive number")
-    return max(1, math.ceil(pole * period / (safety * STABILITY_LIMIT)))
+    def _look(
+        self, watched: Watched | None, elapsed: float, y: NDArray[np.float64], u: NDArray[np.float64]
+    ) -> None:
+        if watched is not None and isinstance(self._watch, NativeFunction):
+            watched.memory[:] = self._watch(watched.memory, watched.time + elapsed, y, u, watched.p)
 
 
 def _column(name: str, value: ArrayLike, size: int) -> NDArray[np.float64]:

@@ -8,7 +8,9 @@
  * for each; it goes in and comes out, as do y = (x, quad), c, and z, the signals of the last sample. Between two arrivals the plant takes equal
  * Runge-Kutta steps of order 4, none longer than `longest`.
  * out receives (x, quad, c, command in force, z) at every record_every-th sample, taken after control ran;
- * a row more than steps means one last sample without a period after it. Nothing is allocated here.
+ * a row more than steps means one last sample without a period after it.
+ * A watch, if there is one, remembers w: look(w, time, y, command in force, c, z, p) -> w sees every sample after
+ * control ran, and glance(w, time, y, p) -> w the end of every step of the plant. Nothing is allocated here.
  * Returns the number of samples done: n_rows, or the first at which a number was not finite. */
 typedef struct {
     int (*f)(const double** arg, double** res, long long* iw, double* w, int memory);
@@ -42,22 +44,44 @@ static int passiflex_plant_step(
     return 0;
 }
 
+/* Let a function of a watch remember w of n_w numbers; next has room for as many. */
+static int passiflex_remember(const passiflex_callable* f, double* w, double* next, long long n_w)
+{
+    f->arg[0] = w;
+    f->res[0] = next;
+    if (f->f(f->arg, f->res, f->iw, f->w, f->memory)) return 1;
+    for (long long i = 0; i < n_w; i++) w[i] = next[i];
+    return 0;
+}
+
 CASADI_SYMBOL_EXPORT long long passiflex_held_loop(
     const passiflex_callable* plant, const passiflex_callable* control,
-    const long long* sizes, double* y, double* c, double* line, double* z,
-    const double* rows, const double* timing, const double* p_plant, const double* p_control,
-    long long n_rows, long long steps, double period, double longest, long long record_every,
+    const passiflex_callable* look, const passiflex_callable* glance,
+    const long long* sizes, double* y, double* c, double* line, double* z, double* w,
+    const double* rows, const double* timing, const double* p_plant, const double* p_control, const double* p_watch,
+    long long first, long long n_rows, long long steps, double period, double longest, long long record_every,
     double* out, double* scratch)
 {
     const long long n_x = sizes[0], n_q = sizes[1], n_c = sizes[2], n_u = sizes[3];
     const long long n_w = sizes[4], n_s = sizes[5], n_z = sizes[6], n = n_x + n_q;
+    const long long n_m = sizes[7];
     const long long width = n + n_c + n_u + n_z;
     double *next = scratch, *command = next + n_c, *input = command + n_u;
     double *work = input + n_u + n_s, *held = line + 1, *queue = held + n_u;
     const long long entry = n_u + 1;
+    double now, *next_w = work + 3 * n;
+
+    if (look) {
+        look->arg[1] = glance->arg[1] = &now;
+        look->arg[2] = glance->arg[2] = y;
+        look->arg[3] = held;
+        look->arg[4] = c;
+        look->arg[5] = z;
+        look->arg[6] = glance->arg[3] = p_watch;
+    }
 
     for (long long k = 0; k < n_rows; k++) {
-        const double* row = rows + k * n_w;
+        const double *row = rows + k * n_w, start = (double)(first + k) * period;
         if (timing[2 * k + 1] != 0.0) {
             long long waiting = (long long)line[0];
             double arrival = timing[2 * k];
@@ -84,6 +108,8 @@ CASADI_SYMBOL_EXPORT long long passiflex_held_loop(
                 for (long long i = 0; i < waiting * entry; i++) queue[i] = queue[i + entry];
             }
             line[0] = (double)waiting;
+            now = start;
+            if (look && t == 0.0 && passiflex_remember(look, w, next_w, n_m)) return k;
             if (t == 0.0 && k % record_every == 0) {
                 for (long long i = 0; i < n; i++) *out++ = y[i];
                 for (long long i = 0; i < n_c; i++) *out++ = c[i];
@@ -96,8 +122,12 @@ CASADI_SYMBOL_EXPORT long long passiflex_held_loop(
             if (count < 1) count = 1;
             for (long long i = 0; i < n_u; i++) input[i] = held[i];
             for (long long i = 0; i < n_s; i++) input[n_u + i] = row[i];
-            for (long long i = 0; i < count; i++)
-                if (passiflex_plant_step(plant, n_x, n_q, y, input, p_plant, (until - t) / count, work)) return k;
+            const double h = (until - t) / count;
+            for (long long i = 0; i < count; i++) {
+                if (passiflex_plant_step(plant, n_x, n_q, y, input, p_plant, h, work)) return k;
+                now = start + (t + (i + 1) * h);
+                if (look && passiflex_remember(glance, w, next_w, n_m)) return k;
+            }
             t = until;
         }
         for (long long i = 0; i < (long long)line[0]; i++) queue[i * entry] -= period;

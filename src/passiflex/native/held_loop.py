@@ -12,10 +12,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from passiflex.errors import SizeError, ValueRangeError
-from passiflex.native.entry import Entry, address
+from passiflex.native.entry import Callable, Entry, address
 from passiflex.native.fixed_step import step_function
 from passiflex.native.function import NativeFunction
 from passiflex.native.library import c_source
+from passiflex.native.loop_state import LoopState, Samples, Watch
 
 Array = NDArray[np.float64]
 
@@ -28,53 +29,31 @@ TOGETHER = 1e-9
 """Two instants closer than this share of a period are one."""
 
 
-class _Callable(ctypes.Structure):
-    _fields_ = (
-        ("function", ctypes.c_void_p),
-        ("memory", ctypes.c_int),
-        *((name, ctypes.c_void_p) for name in ("arg", "res", "iw", "w")),
-    )
-
-
 _ROUTINE = [
-    *[ctypes.c_void_p] * 11, *[ctypes.c_longlong] * 2, *[ctypes.c_double] * 2, ctypes.c_longlong,
+    *[ctypes.c_void_p] * 15, *[ctypes.c_longlong] * 3, *[ctypes.c_double] * 2, ctypes.c_longlong,
     *[ctypes.c_void_p] * 2,
 ]  # fmt: skip
 
 
-class LoopState(NamedTuple):
-    """Everything that goes from one call to the next.
+class _Call(NamedTuple):
+    """The arguments of one call; `y`, `c`, `line`, `z`, `w` and `out` are written to."""
 
-    Attributes
-    ----------
-    x: State of the plant.
-    quads: Its quadratures (energies) since the start.
-    controller: State of the controller.
-    line: Commands on their way, as `held_loop.c` has them.
-    signals: What the controller said last.
-    """
-
-    x: Array
-    quads: Array
-    controller: Array
+    y: Array
+    c: Array
     line: Array
-    signals: Array
-
-
-class Samples(NamedTuple):
-    """Recorded samples, each taken after the controller ran.
-
-    `completed` below the number of rows is the sample at which a number ceased to be finite; rows that
-    were not reached are NaN.
-    """
-
-    x: Array
-    quads: Array
-    controller: Array
-    command: Array
-    signals: Array
-    completed: int
-    state: LoopState
+    z: Array
+    w: Array
+    rows: Array
+    timing: Array
+    p_plant: Array
+    p_control: Array
+    p_watch: Array | None
+    first: int
+    steps: int
+    period: float
+    longest: float
+    record_every: int
+    out: Array
 
 
 class HeldLoop:
@@ -88,9 +67,16 @@ class HeldLoop:
     plant, control: The two functions; all inputs and outputs are columns.
     library: What `compile_functions([plant, control, …], driver=HELD_LOOP_DRIVER)` returned; None runs
         CasADi's virtual machine.
+    watch: What sees every sample and every step; its functions are in the library too.
     """
 
-    def __init__(self, plant: cs.Function, control: cs.Function, library: Path | None = None):
+    def __init__(
+        self,
+        plant: cs.Function,
+        control: cs.Function,
+        library: Path | None = None,
+        watch: Watch | None = None,
+    ):
         if not _fit(plant, control):
             raise SizeError(
                 "plant and control do not fit",
@@ -103,12 +89,16 @@ class HeldLoop:
         self.n_q, self.n_u, self.n_z = plant.size1_out(1), control.size1_out(1), control.size1_out(2)
         self.n_s = inputs - self.n_u
         self.n_line = 1 + self.n_u + LONGEST_LINE * (1 + self.n_u)
-        self._plant = Entry(library, plant.name()) if library is not None else None
-        self._control = Entry(library, control.name()) if library is not None else None
-        if self._plant is not None:
-            self._routine = self._plant.routine("passiflex_held_loop", _ROUTINE)
+        self.n_m, self.n_p_watch = (watch.size, watch.parameters) if watch is not None else (0, 0)
+        self._entries: list[Entry | None] | None = None
+        self._watch: list[NativeFunction] = []
+        if library is not None:
+            self._entries = [Entry(library, f.name()) for f in (plant, control, *(watch or ()))]
+            self._entries += [None] * (4 - len(self._entries))
+            self._routine = Entry(library, plant.name()).routine("passiflex_held_loop", _ROUTINE)
         else:
             self._step, self._law = NativeFunction(step_function(plant)), NativeFunction(control)
+            self._watch = [NativeFunction(f) for f in watch or ()]
 
     def start(self, x: ArrayLike, controller: ArrayLike, command: ArrayLike) -> LoopState:
         """Return the state before the first sample, with `command` in force."""
@@ -120,6 +110,7 @@ class HeldLoop:
             _column("controller", controller, self.n_c),
             line,
             np.full(self.n_z, np.nan),
+            np.zeros(self.n_m),
         )
 
     def advance(
@@ -134,6 +125,8 @@ class HeldLoop:
         record_every: int = 1,
         *,
         last: bool = False,
+        first: int = 0,
+        p_watch: ArrayLike | None = None,
     ) -> Samples:
         """Return the samples of the rows, and the state after them.
 
@@ -146,6 +139,8 @@ class HeldLoop:
         longest: Longest step of the plant [s].
         record_every: Samples from one recorded to the next.
         last: True if the last row is a sample only, with no period after it.
+        first: Number of the first sample, by which the watch tells the time.
+        p_watch: Parameters of the watch; None shows it nothing.
 
         Raises
         ------
@@ -170,78 +165,71 @@ class HeldLoop:
                 got=f"{timing[:, 0].min()} to {timing[:, 0].max()} s",
                 needs=f"0 to {LONGEST_LINE - 3} periods",
             )
-        p_plant, p_control = (
-            _column("p_plant", p_plant, self.n_p),
-            _column("p_control", p_control, self.n_p_control),
-        )
         width = self.n_x + self.n_q + self.n_c + self.n_u + self.n_z
         out = np.full((-(-len(rows) // record_every), width), np.nan)
-        sizes = (self.n_x, self.n_q, self.n_c, self.n_line, self.n_z)
+        sizes = (self.n_x, self.n_q, self.n_c, self.n_line, self.n_z, self.n_m)
         parts = zip(LoopState._fields, state, sizes, strict=True)
-        x, quads, c, line, z = (_column(f"{name} of the state", *rest) for name, *rest in parts)
+        x, quads, c, line, z, w = (_column(f"{name} of the state", *rest) for name, *rest in parts)
         y = np.concatenate([x, quads])
-        run = self._in_machine if self._plant is None else self._in_c
-        steps = len(rows) - last
-        completed = run(
-            y, c, line, z, rows, timing, p_plant, p_control, steps, period, longest, record_every, out
+        given = (
+            _column("p_plant", p_plant, self.n_p),
+            _column("p_control", p_control, self.n_p_control),
+            None if p_watch is None else _column("p_watch", p_watch, self.n_p_watch),
         )
-        x, quads, memory, command, signals = np.split(
-            out, np.cumsum([self.n_x, self.n_q, self.n_c, self.n_u]), axis=1
+        call = _Call(
+            y,
+            c,
+            line,
+            z,
+            w,
+            rows,
+            timing,
+            *given,
+            first,
+            len(rows) - last,
+            period,
+            longest,
+            record_every,
+            out,
         )
-        return Samples(
-            x, quads, memory, command, signals, completed, LoopState(y[: self.n_x], y[self.n_x :], c, line, z)
-        )
+        completed = self._in_machine(call) if self._entries is None else self._in_c(call, self._entries)
+        ends = np.cumsum([self.n_x, self.n_q, self.n_c, self.n_u])
+        x, quads, memory, command, signals = np.split(out, ends, axis=1)
+        after = LoopState(y[: self.n_x], y[self.n_x :], c, line, z, w)
+        return Samples(x, quads, memory, command, signals, completed, after)
 
-    def _in_c(
-        self,
-        y: Array,
-        c: Array,
-        line: Array,
-        z: Array,
-        rows: Array,
-        timing: Array,
-        p_plant: Array,
-        p_control: Array,
-        steps: int,
-        period: float,
-        longest: float,
-        record_every: int,
-        out: Array,
-    ) -> int:
-        assert self._plant is not None
-        assert self._control is not None
-        kept = [entry.work() for entry in (self._plant, self._control)]
-        callables = [
-            _Callable(
-                e.address, e.memory, ctypes.addressof(arg), ctypes.addressof(res), address(iw), address(w)
-            )
-            for e, (arg, res, iw, w) in zip((self._plant, self._control), kept, strict=True)
-        ]
-        sizes = np.array([self.n_x, self.n_q, self.n_c, self.n_u, self.n_w, self.n_s, self.n_z], np.int64)
-        n = self.n_x + self.n_q
-        scratch = np.full(self.n_c + 2 * self.n_u + self.n_s + 3 * n, np.nan)
-        arrays = (sizes, y, c, line, z, rows, timing, p_plant, p_control)
+    def _in_c(self, call: _Call, entries: list[Entry | None]) -> int:
+        shown = entries if call.p_watch is not None else [*entries[:2], None, None]
+        callables = [Callable.of(entry) if entry is not None else None for entry in shown]
+        sizes = np.array(
+            [self.n_x, self.n_q, self.n_c, self.n_u, self.n_w, self.n_s, self.n_z, self.n_m], np.int64
+        )
+        scratch = np.full(self.n_c + 2 * self.n_u + self.n_s + 3 * (self.n_x + self.n_q) + self.n_m, np.nan)
+        arrays = [address(a) if a is not None else None for a in call[:10]]
         return self._routine(
-            *(ctypes.addressof(e) for e in callables), *map(address, arrays),
-            len(rows), steps, period, longest, record_every, address(out), address(scratch),
+            *(ctypes.byref(f) if f is not None else None for f in callables), address(sizes), *arrays,
+            call.first, len(call.rows), *call[11:15], address(call.out), address(scratch),
         )  # fmt: skip
 
-    def _in_machine(
-        self,
-        y: Array,
-        c: Array,
-        line: Array,
-        z: Array,
-        rows: Array,
-        timing: Array,
-        p_plant: Array,
-        p_control: Array,
-        steps: int,
-        period: float,
-        longest: float,
-        record_every: int,
-        out: Array,
-    ) -> int:
+    def _in_machine(self, call: _Call) -> int:
+        (
+            y,
+            c,
+            line,
+            z,
+            w,
+            rows,
+            timing,
+            p_plant,
+            p_control,
+            p_watch,
+            first,
+            steps,
+            period,
+            longest,
+            every,
+            out,
+        ) = call
         held, queue = line[1 : 1 + self.n_u], line[1 + self.n_u :].reshape(LONGEST_LINE, 1 + self.n_u)
         for k, (row, (delay, runs)) in enumerate(zip(rows, timing, strict=True)):
             if runs:
@@ -256,15 +244,20 @@ class HeldLoop:
                     held[:] = queue[0, 1:]
                     queue[:-1] = queue[1:].copy()
                     line[0] -= 1
-                if t == 0.0 and k % record_every == 0:
-                    out[k // record_every] = np.concatenate([y, c, held, z])
+                if t == 0.0 and self._watch and p_watch is not None:
+                    w[:] = self._watch[0](w, (first + k) * period, y, held, c, z, p_watch)
+                if t == 0.0 and k % every == 0:
+                    out[k // every] = np.concatenate([y, c, held, z])
                 if k >= steps or t >= period:
                     break
                 until = min(queue[0, 0], period) if line[0] else period
                 count = max(1, math.ceil((until - t) / longest * (1 - 1e-12)))
                 inputs = np.concatenate([held, row[: self.n_s]])
-                for _ in range(count):
-                    y[:] = self._step(y, inputs, p_plant, (until - t) / count)
+                h = (until - t) / count
+                for i in range(count):
+                    y[:] = self._step(y, inputs, p_plant, h)
+                    if self._watch and p_watch is not None:
+                        w[:] = self._watch[1](w, (first + k) * period + (t + (i + 1) * h), y, p_watch)
                 t = until
             queue[: int(line[0]), 0] -= period
             if not np.isfinite(y).all():

@@ -33,6 +33,7 @@ class LaneState(NamedTuple):
     controller, signals: As of `LoopState`.
     line: Commands on their way, a row for each lane.
     told: What was told last.
+    watched: What the watch remembers.
     """
 
     y: Array
@@ -40,6 +41,7 @@ class LaneState(NamedTuple):
     signals: Array
     line: Array
     told: Array
+    watched: Array
 
 
 class LaneSamples(NamedTuple):

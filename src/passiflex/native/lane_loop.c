@@ -3,6 +3,7 @@
  * The text before this one defines, for lanes, the generated functions and their sizes:
  *   PLANT(x, [command, surroundings], p) -> (dx, dquad)      CONTROL(x, c, row, p) -> (c, command, z)
  *   ROW(time, told, drawn) -> row                            TRUTH(x, command, surroundings, p) -> truth
+ *   LOOK(w, time, y, command in force, c, z, p) -> w and GLANCE(w, time, y, p) -> w, if N_M is not 0, as in held_loop.c
  * What is told to a lane changes at single periods (changes, in the order of periods: period, lane, and where
  * in told_values its numbers stand); drawn are the numbers that chance gives to each period. timing holds for
  * each period and lane the delay of the command and whether the controller runs. Each lane keeps its own line
@@ -15,13 +16,13 @@
 typedef struct {
     long long first, n_rows, steps, record_every, n_changes, n_kept;
     double period;
-    lanes *y, *c, *told, *z;
+    lanes *y, *c, *told, *z, *w;
     double *line, *longest;
     const long long* changes;
     const double* told_values;
     const lanes* drawn;
     const double* timing;
-    const lanes *p_plant, *p_control;
+    const lanes *p_plant, *p_control, *p_watch;
     const long long* kept;
     lanes* out;
     long long *completed, *whole;
@@ -33,7 +34,7 @@ enum { N_Y = N_X + N_Q, ENTRY = 1 + N_U, LINE = 1 + N_U + LONGEST_LINE * ENTRY,
 /* One lane's way through a period: where it is, and the equal steps to the next arrival. */
 typedef struct {
     double t, h, until;
-    long long left;
+    long long left, done;
     int arrived; /* at the end of the period */
 } lane_clock;
 
@@ -84,28 +85,58 @@ static void lane_plan(lane_clock* clock, const double* line, double period, doub
     clock->left = (long long)ceil((clock->until - clock->t) / longest * (1.0 - 1e-12));
     if (clock->left < 1) clock->left = 1;
     clock->h = (clock->until - clock->t) / clock->left;
+    clock->done = 0;
 }
 
-static void lane_period(const passiflex_lane_run* r, lanes* input)
+/* Let the watch see a sample, or a step, of those lanes that are seen. */
+static void lane_look(const passiflex_lane_run* r, const lanes* held, lanes time, lane_bits seen)
+{
+#if N_M > 0
+    lanes next[N_M];
+    LOOK(r->w, &time, r->y, held, r->c, r->z, r->p_watch, next);
+    for (int i = 0; i < N_M; i++) r->w[i] = where(seen, next[i], r->w[i]);
+#endif
+}
+
+static void lane_glance(const passiflex_lane_run* r, lanes time, lane_bits seen)
+{
+#if N_M > 0
+    lanes next[N_M];
+    GLANCE(r->w, &time, r->y, r->p_watch, next);
+    for (int i = 0; i < N_M; i++) r->w[i] = where(seen, next[i], r->w[i]);
+#endif
+}
+
+/* The lanes whose numbers are all finite: what has left them is not watched any more. */
+static lane_bits lane_whole(const lanes* y)
+{
+    lane_bits whole = all_bits(-1);
+    for (int i = 0; i < N_Y; i++) EACH_LANE if (!isfinite(LANE(y[i], l))) LANE(whole, l) = 0;
+    return whole;
+}
+
+static void lane_period(const passiflex_lane_run* r, lanes* input, double start, lane_bits whole)
 {
     lane_clock clock[LANES];
     EACH_LANE
     {
-        clock[l] = (lane_clock){0.0, 0.0, 0.0, 0, 0};
+        clock[l] = (lane_clock){0.0, 0.0, 0.0, 0, 0, 0};
         lane_plan(&clock[l], r->line + l * LINE, r->period, r->longest[l]);
     }
     for (;;) {
-        lanes h = all_lanes(0.0);
+        lanes h = all_lanes(0.0), time = all_lanes(start);
         lane_bits moving = all_bits(0);
         int some = 0;
         EACH_LANE if (!clock[l].arrived)
         {
             LANE(h, l) = clock[l].h;
+            LANE(time, l) = start + (clock[l].t + (++clock[l].done) * clock[l].h);
             LANE(moving, l) = -1;
             some = 1;
         }
         if (!some) return;
         lane_step(r->y, input, r->p_plant, h, moving);
+        lane_glance(r, time, moving & whole);
         EACH_LANE if (!clock[l].arrived && --clock[l].left == 0)
         {
             double* line = r->line + l * LINE;
@@ -128,6 +159,7 @@ LANE_EXPORT void passiflex_lane_loop(const passiflex_lane_run* r)
     lanes seen[N_SEEN], none = all_lanes(0.0); /* NaN once a number was not finite */
     const long long* change = r->changes;
     lanes* out = r->out;
+    lane_bits whole = lane_whole(r->y);
     EACH_LANE r->completed[l] = r->n_rows, r->whole[l] = 0;
     for (long long k = 0; k < r->n_rows; k++) {
         const double* timing = r->timing + k * 2 * LANES;
@@ -146,6 +178,7 @@ LANE_EXPORT void passiflex_lane_loop(const passiflex_lane_run* r)
             if (timing[LANES + l] != 0.0) lane_send(r->line + l * LINE, command, l, timing[l]);
             lane_receive(r->line + l * LINE, input, l, 0.0, r->period);
         }
+        lane_look(r, input, time, whole);
         if (k % r->record_every == 0) {
             lanes* s = seen;
             memcpy(s, r->y, N_Y * sizeof(lanes)), s += N_Y;
@@ -159,17 +192,16 @@ LANE_EXPORT void passiflex_lane_loop(const passiflex_lane_run* r)
             EACH_LANE r->whole[l] += LANE(none, l) == 0.0;
         }
         if (k >= r->steps) break;
-        lane_period(r, input);
+        lane_period(r, input, (double)(r->first + k) * r->period, whole);
         int alive = 0;
+        whole = lane_whole(r->y);
         EACH_LANE
         {
             double* line = r->line + l * LINE;
             for (long long i = 0; i < (long long)line[0]; i++) line[1 + N_U + i * ENTRY] -= r->period;
             if (r->completed[l] < r->n_rows) continue;
-            int finite = 1;
-            for (int i = 0; i < N_Y; i++) finite &= isfinite(LANE(r->y[i], l)) != 0;
-            if (!finite) r->completed[l] = k;
-            alive |= finite;
+            if (!LANE(whole, l)) r->completed[l] = k;
+            alive |= LANE(whole, l) != 0;
         }
         if (!alive) return;
     }

@@ -12,10 +12,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from passiflex.errors import SizeError, ValueRangeError
 from passiflex.native.entry import address
-from passiflex.native.held_loop import LONGEST_LINE, LoopState
+from passiflex.native.held_loop import LONGEST_LINE
 from passiflex.native.lane_data import LaneInputs, LaneSamples, LaneState, aligned
 from passiflex.native.lane_source import lane_source
 from passiflex.native.library import c_source, compile_source
+from passiflex.native.loop_state import LoopState, Watch
 
 Array = NDArray[np.float64]
 
@@ -27,15 +28,15 @@ class _Run(ctypes.Structure):
         *(
             (name, ctypes.c_void_p)
             for name in (
-                "y", "c", "told", "z", "line", "longest", "changes", "told_values", "drawn", "timing",
-                "p_plant", "p_control", "kept", "out", "completed", "whole",
+                "y", "c", "told", "z", "w", "line", "longest", "changes", "told_values", "drawn", "timing",
+                "p_plant", "p_control", "p_watch", "kept", "out", "completed", "whole",
             )
         ),
     )  # fmt: skip
 
 
 class LaneFunctions(NamedTuple):
-    """The four functions of a loop, all of dense columns.
+    """The functions of a loop, all of dense columns.
 
     Attributes
     ----------
@@ -43,12 +44,22 @@ class LaneFunctions(NamedTuple):
     control: (x, c, row, p) → (c, command, signals); a row begins with the surroundings.
     row: (time, told, drawn) → row.
     truth: (x, command, surroundings, p) → what is true then, with p as for control.
+    watch: What sees every sample and every step, or none.
     """
 
     plant: cs.Function
     control: cs.Function
     row: cs.Function
     truth: cs.Function
+    watch: Watch | None = None
+
+    @property
+    def there(self) -> dict[str, cs.Function]:
+        """Return all functions that there are, by name."""
+        return {
+            **dict(zip(self._fields, self[:4], strict=False)),
+            **(self.watch._asdict() if self.watch else {}),
+        }
 
 
 class LaneLoop:
@@ -79,6 +90,7 @@ class LaneLoop:
         self.n_told, self.n_drawn, self.n_w = f.row.size1_in(1), f.row.size1_in(2), f.row.size1_out(0)
         self.n_p_plant, self.n_p_control = f.plant.size1_in(2), f.control.size1_in(3)
         self.n_truth = f.truth.size1_out(0)
+        self.n_m, self.n_p_watch = (f.watch.size, f.watch.parameters) if f.watch is not None else (0, 0)
         _require_fit(f, self)
         self.n_line = 1 + self.n_u + LONGEST_LINE * (1 + self.n_u)
         self.library = compile_source(self._source(f, width))
@@ -113,6 +125,7 @@ class LaneLoop:
             np.stack([s.signals for s in states], axis=1),
             np.stack([s.line for s in states]),
             np.zeros((self.n_told, self.width)),
+            np.stack([s.watched for s in states], axis=1),
         )
 
     def advance(
@@ -127,6 +140,7 @@ class LaneLoop:
         record_every: int = 1,
         *,
         last: bool = False,
+        p_watch: Array | None = None,
     ) -> LaneSamples:
         """Return the samples of a stretch, and the state after it.
 
@@ -140,6 +154,7 @@ class LaneLoop:
         kept: Which numbers of a sample to record, see `instant`.
         record_every: Samples from one recorded to the next.
         last: True if the last row is a sample only, with no period after it.
+        p_watch: Parameters of the watch (n, lanes), if there is one.
 
         Raises
         ------
@@ -169,10 +184,14 @@ class LaneLoop:
             "z": aligned("signals", state.signals, (self.n_z, w)),
             "line": aligned("line", state.line, (w, self.n_line)),
             "told": aligned("told", state.told, (self.n_told, w)),
+            "w": aligned("watched", state.watched, (self.n_m, w)),
             "drawn": aligned("drawn", inputs.drawn, (n, self.n_drawn, w)),
             "timing": aligned("timing", inputs.timing, (n, 2, w)),
             "p_plant": aligned("p_plant", p_plant, (self.n_p_plant, w)),
             "p_control": aligned("p_control", p_control, (self.n_p_control, w)),
+            "p_watch": aligned(
+                "p_watch", np.zeros((0, w)) if p_watch is None else p_watch, (self.n_p_watch, w)
+            ),
             "longest": aligned("longest", longest, (w,)),
             "out": aligned("out", None, (-(-n // record_every), kept.size, w)),
         }
@@ -189,7 +208,7 @@ class LaneLoop:
             completed=address(completed), whole=address(whole), **{name: address(a) for name, a in arrays.items()},
         )  # fmt: skip
         self._routine(ctypes.byref(run))
-        after = LaneState(*(arrays[name] for name in ("y", "c", "z", "line", "told")))
+        after = LaneState(*(arrays[name] for name in ("y", "c", "z", "line", "told", "w")))
         return LaneSamples(arrays["out"], completed, whole, after)
 
     def _source(self, f: LaneFunctions, width: int | None) -> str:
@@ -199,8 +218,9 @@ class LaneLoop:
             "N_TRUTH": self.n_truth, "LONGEST_LINE": LONGEST_LINE,
         }  # fmt: skip
         lines = [f"enum {{ {', '.join(f'{name} = {size}' for name, size in sizes.items())} }};"]
-        lines += [f"#define {part.upper()} {g.name()}_in_lanes" for part, g in f._asdict().items()]
-        return "\n".join((lane_source(f, width), *lines, c_source("lane_loop.c")))
+        lines += [f"#define {part.upper()} {g.name()}_in_lanes" for part, g in f.there.items()]
+        lines.append(f"#define N_M {self.n_m}")
+        return "\n".join((lane_source(list(f.there.values()), width), *lines, c_source("lane_loop.c")))
 
 
 def _require_range(
@@ -219,8 +239,12 @@ def _require_fit(f: LaneFunctions, n: LaneLoop) -> None:
         "row": ((1, n.n_told, n.n_drawn), (n.n_w,)),
         "truth": ((n.n_x, n.n_u, n.n_s, n.n_p_control), (n.n_truth,)),
     }
+    if f.watch is not None:
+        seen = (n.n_m, 1, n.n_x + n.n_q)
+        needed["look"] = ((*seen, n.n_u, n.n_c, n.n_z, n.n_p_watch), (n.n_m,))
+        needed["glance"] = ((*seen, n.n_p_watch), (n.n_m,))
     for name, sizes in needed.items():
-        g = getattr(f, name)
+        g = f.there[name]
         parts = [g.sparsity_in(i) for i in range(g.n_in())], [g.sparsity_out(i) for i in range(g.n_out())]
         found = tuple(tuple(part.size1() if part.size2() <= 1 else -1 for part in side) for side in parts)
         if found != sizes or not all(part.is_dense() for side in parts for part in side):

@@ -3,7 +3,7 @@
 from passiflex.passivity.audit import Audit as Audit
 from passiflex.passivity.audit import audit as audit
 from passiflex.passivity.audit import audit_if_possible as audit_if_possible
-from passiflex.passivity.audit import available_energy as available_energy
+from passiflex.passivity.extremes import available_energy as available_energy
 from passiflex.passivity.ledger import Balance as Balance
 from passiflex.passivity.ledger import claimed_balance as claimed_balance
 from passiflex.passivity.ledger import link_balance as link_balance

@@ -2,27 +2,22 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from passiflex.passivity.extremes import Extremes, available_energy, extremes
 from passiflex.passivity.ledger import (
     Balance,
     Signals,
     claimed_balance,
-    initial_tank,
     link_balance,
     motor_side_storage,
-    overclaimed,
-    port_energy,
     robot_balance,
 )
-
-ROUND_OFF = 1e-13
-"""An overdraft below this share of the energy at hand (or of 1 J) is round-off."""
+from passiflex.simulation.unbooked import SHAPED, listed
+from passiflex.simulation.witness import TERMS
 
 Verdict = Literal["passive", "violated", "inconclusive"]
 
@@ -33,7 +28,9 @@ class Audit:
 
     The links are passive by physics. So the robot is passive at its end effector if law and motors never
     give more to the links, W̃(t), than they had at the start: S̃₀ + T₀, what they stored and what the tank
-    was filled with. A law without a tank is also allowed what the moving reference gave it.
+    was filled with. A law without a tank is also allowed what the moving reference gave it. All this is an
+    extremum over time: the loop notes it at every step, whatever rows it records. Of a file of before there
+    are the rows alone.
 
     Attributes
     ----------
@@ -42,10 +39,13 @@ class Audit:
     time: When it was decided [s]: the first overdraft, or the least margin.
     term: What took most of the energy by then.
     margin: Least of S̃₀ + T₀ − W̃ over the run [J]; negative by the largest overdraft.
+    margin_time: When the margin was least [s].
     integration_error: Largest residual of the links' balance, which holds whatever the law [J].
     books_error: How wrong the law's own books are [J]: the largest residual of (28)–(29), round-off if its
         model is right; of a sampled law, the most that its tank claims beyond what is there.
-    ledger_residual: Largest residual of the real robot's balance (4) [J].
+    ledger_residual: Largest residual of the real robot's balance (4), at the rows [J].
+    unbooked: What the law's books do not know in this run, in words.
+    every_step: Whether it was judged at every step; otherwise at its rows, and nobody saw what was between.
     remedy: What to do about it.
     """
 
@@ -53,9 +53,12 @@ class Audit:
     time: float
     term: str
     margin: float
+    margin_time: float
     integration_error: float
     books_error: float
     ledger_residual: float
+    unbooked: str
+    every_step: bool
     remedy: str
     balances: tuple[Balance, ...]
 
@@ -67,37 +70,57 @@ class Audit:
 
 def audit(run: Signals) -> Audit:
     """Return the audit of a run."""
-    robot, links, law = robot_balance(run), link_balance(run), claimed_balance(run)
-    error = np.maximum.accumulate(np.abs(links.residual))
-    round_off = ROUND_OFF * np.maximum(1.0, np.maximum.accumulate(np.abs(links.total)))
-    margin = available_energy(run)
-    verdict: Verdict
-    if (margin < -error - round_off).any():
-        verdict, decided = "violated", int(np.argmax(margin < -error - round_off))
-        remedy = (
-            "see `passiflex limits` for the gains that hold at this rate"
-            if run.sampled
-            else "lower the gains, give the tank more to start with, or correct the law's model"
-        )
-    elif run.failure:
-        verdict, decided = "inconclusive", int(np.argmin(margin))
-        remedy = f"the run ended early: {run.failure}"
-    elif not (margin >= error - round_off).all():  # so that a NaN can never be passive
-        verdict, decided = "inconclusive", int(np.argmin(margin >= error - round_off))
-        remedy = "the margin is below the integration error: lower the tolerance"
-    else:
-        verdict, decided, remedy = "passive", int(np.argmin(margin)), "none needed"
+    balances = robot_balance(run), link_balance(run), claimed_balance(run)
+    found = extremes(run)
+    verdict, time, term, remedy = _judged(run, found, readable=_readable(run, balances[1]))
     return Audit(
         verdict=verdict,
-        time=float(run.time[decided]),
-        term=_deciding_term(run, law, decided),
-        margin=float(margin.min()),
-        integration_error=links.worst,
-        books_error=float(np.maximum(overclaimed(run), 0.0).max()) if run.sampled else law.worst,
-        ledger_residual=robot.worst,
+        time=time,
+        term=run.unbooked if term == TERMS[-1] else term,
+        margin=found.margin,
+        margin_time=found.time,
+        integration_error=found.integration_error,
+        books_error=found.books_error,
+        ledger_residual=balances[0].worst,
+        unbooked=run.unbooked,
+        every_step=found.every_step,
         remedy=remedy,
-        balances=(robot, links, law),
+        balances=balances,
     )
+
+
+def _readable(run: Signals, links: Balance) -> bool:
+    """Return whether all numbers that a verdict could be read from are finite."""
+    parts = available_energy(run), motor_side_storage(run), links.residual
+    return all(np.isfinite(part).all() for part in parts)
+
+
+def _judged(run: Signals, found: Extremes, *, readable: bool) -> tuple[Verdict, float, str, str]:
+    """Return the verdict, when it was decided, what had taken most by then, and the remedy."""
+    least = found.time, found.term
+    if found.possible < 0:
+        return "violated", found.overdraft_time, found.overdraft_term, _remedy(run)
+    if run.failure:
+        return "inconclusive", *least, f"the run ended early: {run.failure}"
+    if not found.sure >= 0:  # so that a NaN can never be passive
+        why = "the margin is below the integration error: lower the tolerance"
+        return "inconclusive", found.doubt_time, found.doubt_term, why
+    if not readable:
+        return "inconclusive", *least, "numbers that the books are read from are not finite"
+    return "passive", *least, "none needed"
+
+
+def _remedy(run: Signals) -> str:
+    """Return what helps against an overdraft: of what there is to be changed."""
+    if run.sampled and run.has_tank:
+        return "see `passiflex limits` for the gains that hold at this rate"
+    shapes = run.unbooked.startswith(SHAPED)
+    ways = ["take a larger target_inertia"] if shapes else []
+    ways += ["lower the gains"]
+    ways += ["give the tank more to start with"] if run.has_tank else []
+    ways += ["correct the law's model"] if "model error" in run.unbooked else []
+    ways += ["take the impedance law"] if shapes else []
+    return listed(ways, "or")
 
 
 def audit_if_possible(run: Signals) -> Audit | None:
@@ -106,26 +129,4 @@ def audit_if_possible(run: Signals) -> Audit | None:
         result = audit(run)
     except KeyError:  # how a run says that it has no signal of this name
         return None
-    return result if math.isfinite(result.margin) else None
-
-
-def available_energy(run: Signals) -> NDArray[np.float64]:
-    """Return S̃₀ + T₀ − W̃(t) [J], what law and motors may still give to the links.
-
-    A storage counts from its lowest value: where S̃ became negative (a gravity compensation that is not
-    exact is off by the weight's deflection of the springs), from there.
-    """
-    storage = motor_side_storage(run)
-    budget = initial_tank(run) + float(storage[0] - min(storage.min(), 0.0))
-    lent = 0.0 if run.has_tank else run["reference_energy"]
-    return budget + lent - port_energy(run)
-
-
-def _deciding_term(run: Signals, law: Balance, index: int) -> str:
-    draws = {
-        "motion of the links": run["link_kinetic_energy"][index],
-        "moving reference": run["reference_energy"][index],
-        "work on the environment": -run["external_energy"][index],
-        "model error and noise": law.residual[index],
-    }
-    return max(draws, key=lambda name: draws[name])
+    return result if np.isfinite([result.margin, *available_energy(run)]).all() else None

@@ -29,6 +29,8 @@ class Signals(Protocol):
     def sampled(self) -> bool: ...  # noqa: D102
     @property
     def has_tank(self) -> bool: ...  # noqa: D102
+    @property
+    def unbooked(self) -> str: ...  # noqa: D102
     def __getitem__(self, name: str) -> Array: ...
 
 
@@ -122,13 +124,14 @@ def claimed_balance(run: Signals) -> Balance:
 
     They close if the law's model is right. The residual is the energy that the books miss: of model
     errors, of noise, of whatever the law does not know. A sampled law keeps books at its joints instead:
-    T + S against Σw, as measured.
+    T + S against Σw, as measured; what the reference puts into S comes from the tank, or from outside.
     """
     if run.sampled:
+        outside = {} if run.has_tank else {"reference": lent(run)}
         return Balance(
             "law",
             {"tank": run["tank_energy"] * run.has_tank, "law": run["law_storage"]},
-            {"joints, as measured": -run["measured_port_energy"]},
+            {"joints, as measured": -run["measured_port_energy"]} | outside,
             {"spilled": run["spilled_energy"]},
         )
     return Balance.of(
@@ -164,28 +167,40 @@ def motor_side_storage(run: Signals) -> Array:
 
 
 def port_energy(run: Signals) -> Array:
-    """Return W̃(t) [J]: given to the links through the joints, ∫ τ_aᵀ q̇, less the weight lifted by it."""
-    carried = run["compensated_energy"]
+    """Return W̃(t) [J]: given to the links through the joints, ∫ τ_aᵀ q̇, less the weight lifted by it.
+
+    The weight V̂ is taken where the links really are; older sampled runs know it where they were measured.
+    """
+    try:
+        carried = run["carried_energy"]
+    except KeyError:
+        carried = run["compensated_energy"]
     return run["joint_energy"] - (carried - carried[0])
 
 
 def port_tank(run: Signals) -> Array:
-    """Return what a tank at the joint port would hold [J]: T₀ − (S̃ − S̃₀) − W̃.
+    """Return what a tank at the joint port would hold [J]: T₀ − (S̃ − S̃₀) − W̃, in which the weight cancels.
 
     It needs no formula for dissipation: with a perfect model it is T₀ + ∫ (P_D − P_X); otherwise it is
     what is really left of T₀.
     """
-    stored = motor_side_storage(run)
-    return initial_tank(run) - (stored - stored[0]) - port_energy(run)
+    stored = motor_side_storage(run) - run["compensated_energy"]
+    return initial_tank(run) - (stored - stored[0]) - run["joint_energy"]
+
+
+def lent(run: Signals) -> Array:
+    """Return what the moving reference gave to a law without a tank since the first row [J]; a tank pays itself."""
+    given = run["reference_energy"]
+    return np.zeros_like(given) if run.has_tank else given - given[0]
 
 
 def overclaimed(run: Signals) -> Array:
-    """Return by how much the level that the tank claims exceeds what is there, T − T_port [J].
+    """Return by how much what the law claims to have exceeds what is there, T − T_port − lent [J].
 
     A sampled law claims a level when it reads its sensors. In a row of a period that it missed, what it claimed at
     the last recorded reading stands.
     """
-    beyond = run["tank_energy"] * run.has_tank - port_tank(run)
+    beyond = run["tank_energy"] * run.has_tank - port_tank(run) - lent(run)
     return beyond[_last_reading(run)] if run.sampled else beyond
 
 

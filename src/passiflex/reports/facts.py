@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 import yaml
 
-from passiflex.simulation import Run, Scenario
+from passiflex.simulation import Run, Scenario, passed_limits
 from passiflex.simulation.law_settings import (
     Damping,
     ImpedanceSettings,
@@ -50,6 +50,7 @@ def facts(run: Run, scenario: Scenario | None) -> Facts:
         found.append(("tank", _tank(scenario)))
         found += _world(scenario)
     found.append(("duration", _duration(run)))
+    found += [("limit passed", str(passed)) for passed in passed_limits(run)]
     found += [("seed", str(attributes["seed"]))] if "seed" in attributes else []
     return found
 

@@ -6,14 +6,12 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
-
 from passiflex.campaigns.measures import MEASURES, measures
 from passiflex.errors import PassiflexError
-from passiflex.passivity import Audit, audit_if_possible, available_energy
-from passiflex.passivity.audit import ROUND_OFF
+from passiflex.passivity import Audit, audit_if_possible
 from passiflex.responses.steps import step_window
 from passiflex.simulation import Run, resolve
+from passiflex.simulation.witness import ROUND_OFF
 from passiflex.views.events import scenario_of
 
 WORDS = {
@@ -29,7 +27,7 @@ OF_JOINTS = {
 
 def verdict_header(run: Run, result: Audit) -> dict[str, Any]:
     """Return the verdict with its evidence; times in s, energies in J."""
-    worst = float(run.time[int(np.argmin(available_energy(run)))])
+    worst = result.margin_time
     return {
         "verdict": result.verdict,
         "sentence": sentence(result, worst),

@@ -146,14 +146,37 @@ class SerialArm:
         """Return ∇V(q) (n,) N m."""
         return self.bias_torque(q, cs.SX.zeros(self.n), m)
 
-    def potential_energy(self, q: cs.SX, m: SimpleNamespace) -> cs.SX:
-        """Return V(q) = −Σ mᵢ gᵀ rᵢ(q) [J], zero with all mass at the base's origin."""
+    def _steps(self, q: cs.SX, m: SimpleNamespace) -> list[cs.SX]:
+        """Return the frame of each link in that of the link before it, as a 4×4 matrix."""
         adam = self._algorithms(m)
-        moment = cs.SX.zeros(3)
-        for i in range(self.n):
-            frame = adam.forward_kinematics(f"link_{i + 1}", cs.SX.eye(4), q).array
-            moment += m.link_mass[i] * (frame[:3, 3] + frame[:3, :3] @ m.link_com[i, :].T)
-        return -cs.dot(m.gravity, moment)
+        joints = adam.model.get_joints_chain(adam.root_link, f"link_{self.n}")
+        return [joint.homogeneous(CasadiLike(q[joint.idx])).array for joint in joints]
+
+    def kinetic_energy(self, q: cs.SX, dq: cs.SX, m: SimpleNamespace) -> cs.SX:
+        """Return ½ q̇ᵀ M(q) q̇ [J], from the velocity of each link in its own axes: a quarter of what M takes."""
+        spin, speed, energy = cs.SX.zeros(3), cs.SX.zeros(3), cs.SX(0)
+        for i, (joint, step) in enumerate(zip(self.chain.joints, self._steps(q, m), strict=True)):
+            turn, own = step[:3, :3].T, cs.sparsify(cs.DM(joint.axis)) * dq[i]
+            speed = turn @ (speed + cs.cross(spin, step[:3, 3]))
+            spin = turn @ spin
+            if joint.kind == "prismatic":
+                speed += own
+            else:
+                spin += own
+            at_com = speed + cs.cross(spin, m.link_com[i, :].T)
+            x, y, z = cs.vertsplit(spin)
+            products = cs.vertcat(x * x, 2 * x * y, 2 * x * z, y * y, 2 * y * z, z * z)
+            energy += m.link_mass[i] * cs.dot(at_com, at_com) + cs.dot(m.link_inertia[i, :].T, products)
+        return energy / 2
+
+    def potential_energy(self, q: cs.SX, m: SimpleNamespace) -> cs.SX:
+        """Return V(q) = −Σ mᵢ gᵀ rᵢ(q) [J], zero with all mass at the base's origin; g in the axes of each link."""
+        gravity, origin, energy = m.gravity, cs.SX(0), cs.SX(0)  # origin: gᵀ times that of the link's frame
+        for i, step in enumerate(self._steps(q, m)):
+            origin += cs.dot(gravity, step[:3, 3])
+            gravity = step[:3, :3].T @ gravity
+            energy -= m.link_mass[i] * (origin + cs.dot(gravity, m.link_com[i, :].T))
+        return energy
 
     def pose(self, q: cs.SX, m: SimpleNamespace) -> EndEffectorPose:
         """Return x = f(q), the end-effector frame in world axes."""

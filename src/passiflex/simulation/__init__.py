@@ -5,6 +5,8 @@ from pathlib import Path
 from passiflex.simulation.closed_loop import ClosedLoop as ClosedLoop
 from passiflex.simulation.compiled import CompiledLoop as CompiledLoop
 from passiflex.simulation.compiled import compiled_loop as compiled_loop
+from passiflex.simulation.passed_limits import PassedLimit as PassedLimit
+from passiflex.simulation.passed_limits import passed_limits as passed_limits
 from passiflex.simulation.problem import Problem as Problem
 from passiflex.simulation.resolve import resolve as resolve
 from passiflex.simulation.run import Run as Run

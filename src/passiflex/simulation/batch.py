@@ -27,6 +27,8 @@ from passiflex.simulation.simulate_sampled import (
     simulate_unchecked,
     start,
 )
+from passiflex.simulation.unbooked import unbooked
+from passiflex.simulation.witness import Noted
 
 Array = NDArray[np.float64]
 T = TypeVar("T")
@@ -47,17 +49,21 @@ class Recording:
     time: Of the rows [s].
     failure: Why the run ended early; empty if it did not.
     has_tank: Whether its law has a tank.
+    unbooked: What the law's books do not know in it, in words.
+    noted: What was noted at every step, whatever was asked for.
     """
 
     signals: dict[str, Array]
     time: Array
     failure: str
     has_tank: bool
+    unbooked: str
+    noted: dict[str, Array]
     sampled: bool = True
 
     def __getitem__(self, name: str) -> Array:
-        """Return a signal as an array; time is the first axis."""
-        return self.signals[name]
+        """Return a signal as an array, time is the first axis; or what was noted."""
+        return self.signals[name] if name in self.signals else self.noted[name]
 
 
 def simulate_batch(
@@ -128,7 +134,9 @@ def lane_loop(problem: Problem, width: int | None = None) -> LaneLoop:
     key = (structure(problem.sampling.controller), width)
     if key not in _lane_loops:
         loop = _compiled(problem).loop
-        functions = LaneFunctions(loop.plant.rhs, loop.control, loop.period.function, loop.outputs)
+        functions = LaneFunctions(
+            loop.plant.rhs, loop.control, loop.period.function, loop.outputs, loop.watch
+        )
         _lane_loops[key] = LaneLoop(functions, width)
     return _lane_loops[key]
 
@@ -151,7 +159,9 @@ def _alone(problem: Problem, keep: Sequence[str]) -> Recording:
     for name in keep:
         if name not in known:
             raise NameUnknownError("signal", name, known)
-    return Recording({name: run[name] for name in keep}, run.time, run.failure, run.has_tank)
+    noted = {f.name: run[f.name] for f in _compiled(problem).loop.witness.extremes}
+    signals = {name: run[name] for name in keep}
+    return Recording(signals, run.time, run.failure, run.has_tank, run.unbooked, noted)
 
 
 def _advance(
@@ -168,6 +178,10 @@ def _advance(
     numbers = [p.sampling for p in map(charged, filled) if p.sampling is not None]
     p_plant = np.stack([n.plant for n in numbers], axis=1)
     p_control = np.stack([n.numbers for n in numbers], axis=1)
+    witness = compiled.loop.witness
+    p_watch = np.concatenate(
+        [p_control, np.stack([witness.numbers(p.law.robot, p.tank.initial) for p in filled], axis=1)]
+    )
     state = lanes.start([start(p, compiled) for p in filled])
     told = [orders(p, compiled.loop.period) for p in filled]
     chances = [Chance(p, compiled.loop.period) for p in filled]
@@ -190,6 +204,7 @@ def _advance(
             columns,
             every,
             last=first + count == samples,
+            p_watch=p_watch,
         )
         state = done.state
         begin = first // every
@@ -200,7 +215,15 @@ def _advance(
         if (ended < samples).all():
             break
     return [
-        _recording(p, values[lane], shapes, int(ended[lane]), int(whole[lane]), samples)
+        _recording(
+            p,
+            values[lane],
+            shapes,
+            int(ended[lane]),
+            int(whole[lane]),
+            samples,
+            witness.noted(state.watched[:, lane]),
+        )
         for lane, p in enumerate(problems)
     ]
 
@@ -242,6 +265,7 @@ def _recording(
     ended: int,
     whole: int,
     samples: int,
+    noted: Noted,
 ) -> Recording:
     """Return what was kept of one lane; energies may leave the finite numbers before states do."""
     s = problem.sampling
@@ -253,7 +277,7 @@ def _recording(
     }
     time = np.arange(count, dtype=np.float64) * (s.period * every)
     failure = "" if ended == samples else left_finite(ended * s.period)
-    return Recording(signals, time, failure, problem.law.has_tank)
+    return Recording(signals, time, failure, problem.law.has_tank, unbooked(problem), noted.values)
 
 
 def simulate_in_lane(problem: Problem) -> Run:
@@ -268,4 +292,5 @@ def simulate_in_lane(problem: Problem) -> Run:
         Rows(layout, np.hstack([recording[f.name].reshape(len(recording.time), f.size) for f in layout]))
         for layout in layouts
     ]
-    return assemble(problem, recording.time, rows, [], recording.failure)
+    noted = Noted(loop.witness.extremes, recording.noted)
+    return assemble(problem, recording.time, rows, [], recording.failure, noted)

@@ -15,6 +15,7 @@ from passiflex.control.tank import EnergyTank
 from passiflex.layout import Field, Layout
 from passiflex.robots.flexible import RobotState
 from passiflex.simulation.motion import MOTION, reference_at
+from passiflex.simulation.witness import Instant, Witness
 
 ENERGIES = Layout(
     (
@@ -46,8 +47,8 @@ class ClosedLoop:
 
     The state is (q, θ, q̇, θ̇, T, s), with s the reference's clock; the input holds the coefficients of
     the reference's motion, the wrench F_e and the noise on τ_a, all constant between two events; the
-    parameters are those of the plant, of the law's model, of the law, of the tank. `rhs`, `outputs` and
-    `law_function` are CasADi functions of flat vectors, ready for code generation.
+    parameters are those of the plant, of the law's model, of the law, of the tank. `rhs`, `outputs`, `watch`
+    and `law_function` are CasADi functions of flat vectors, ready for code generation.
     """
 
     law: AbstractLaw
@@ -216,6 +217,47 @@ class ClosedLoop:
     def outputs(self) -> cs.Function:
         """Return (x, u, p) → the signals of `output_layout`."""
         return cs.Function("outputs", list(self._vectors), [cs.densify(self._signals.outputs)], {"cse": True})
+
+    @cached_property
+    def witness(self) -> Witness:
+        """Return what notes the extremes."""
+        return Witness.of(self.law.robot, has_tank=self.law.has_tank, sampled=False)
+
+    @cached_property
+    def watch(self) -> cs.Function:
+        """Return (memory, time, (x, energies), u, p) → memory, with p as for `rhs`, then that of the witness."""
+        (x, u, p), law, witness = self._vectors, self.law, self.witness
+        memory, w = witness.memory.symbols("w")
+        time, p_watch = cs.SX.sym("time"), cs.SX.sym("p_watch", witness.parameters.size)
+        energies, passed = ENERGIES.symbols("energies")
+        s, inputs, plant, model, gains, tank = self._views()
+        arm, zero = law.robot.arm, cs.SX.zeros(law.robot.n)
+        stored = law.stored(
+            Measurement(s.q, s.theta, s.dq, s.dtheta, zero, cs.SX.zeros(6), zero), model, gains
+        )
+        valve = self.tank.valve(s.tank_energy, tank) if law.has_tank else cs.SX(1)
+        reference = reference_at(s.clock, valve, inputs).pose
+        storage = stored.energy + law.task.potential(stored.pose, reference, gains.stiffness)
+        kinetic, potential = arm.kinetic_energy(s.q, s.dq, plant), arm.potential_energy(s.q, plant)
+        carried = arm.potential_energy(s.q, model)
+        held = kinetic + potential + storage + (s.tank_energy if law.has_tank else 0)
+        now = Instant(
+            time=time,
+            q=s.q,
+            dq=s.dq,
+            tau_m=None,
+            link_kinetic=kinetic,
+            link_potential=potential,
+            carried=carried,
+            external=passed.external,
+            joint=passed.joint,
+            reference=passed.reference,
+            storage=storage + carried,
+            books=held - passed.external - passed.reference + passed.drawn + passed.spilled,
+        )
+        after = witness.look(w, now, witness.parameters.view(p_watch))
+        arguments = [memory, time, cs.vertcat(x, energies), u, cs.vertcat(p, p_watch)]
+        return cs.Function("watch", arguments, [cs.densify(after)], {"cse": True})
 
     @cached_property
     def law_function(self) -> cs.Function:

@@ -86,9 +86,9 @@ def compiled_sampled_loop(controller: SampledController) -> CompiledSampledLoop:
     if key not in _built_sampled:
         loop = SampledLoop(controller)
         functions = [loop.plant.rhs, loop.control, loop.outputs, loop.period.function]
-        library = compile_functions(functions, driver=HELD_LOOP_DRIVER)
+        library = compile_functions([*functions, *loop.watch], driver=HELD_LOOP_DRIVER)
         native = [NativeFunction(f, library) for f in functions]
-        held = HeldLoop(loop.plant.rhs, loop.control, library)
+        held = HeldLoop(loop.plant.rhs, loop.control, library, loop.watch)
         _built_sampled[key] = CompiledSampledLoop(loop, held, *native)
     return _built_sampled[key]
 
@@ -109,11 +109,11 @@ def _urdf(arm: SerialArm) -> str:
 
 
 def _compile(loop: ClosedLoop) -> CompiledLoop:
-    library = compile_functions([loop.rhs, loop.outputs, loop.law_function], driver=DRIVER)
+    library = compile_functions([loop.rhs, loop.outputs, loop.watch, loop.law_function], driver=DRIVER)
     return CompiledLoop(
         loop=loop,
         rhs=load_external("rhs", library, **CVODES_DERIVATIVES) if library else loop.rhs,
-        fixed_step=FixedStep(loop.rhs, library),
+        fixed_step=FixedStep(loop.rhs, library, loop.watch),
         outputs=NativeFunction(loop.outputs, library),
         law=NativeFunction(loop.law_function, library),
     )

@@ -9,8 +9,8 @@ import casadi as cs
 import numpy as np
 from numpy.typing import NDArray
 
-from passiflex.native import FixedStep, Refinement, fastest_pole, stable_step
-from passiflex.native.fixed_step import STABILITY_LIMIT
+from passiflex.native import FixedStep, Refinement, Watched, fastest_pole, stable_step
+from passiflex.native.stability import STABILITY_LIMIT
 
 Array = NDArray[np.float64]
 
@@ -24,20 +24,44 @@ USUAL_TOLERANCE = 1e-9
 """Tolerance for which these shares are meant; the error of a step of order 4 goes with its fourth power."""
 MOST_STEPS = 20_000_000
 """Steps of one stretch at most, about two minutes; more of them is no simulation but a mistake."""
+CHECK, FIRST_CHECK, MOST_CHECKS = 0.5e-3, 1e-6, 100_000
+"""A smooth stretch is looked at so often [s], after an event from a microsecond on, each time twice as late; a stretch
+of more than so many such intervals, so many times."""
+CLOSER = 64
+"""Looks at what is between the two that are next to an extremum: what h²/8 of its second derivative hides is then 1e-3
+as much."""
 SLOW_POLE = 1e4
 """Up to this pole [1/s] Runge-Kutta resolves a run faster than CVODES, which crawls along undamped modes."""
 
 
 class Stretch(NamedTuple):
-    """States and energies at the asked instants; rows after a failure are NaN, and `failure` says why."""
+    """States and energies at the asked instants; rows after a failure are NaN, and `failure` says why.
+
+    Energies count from where the stretch was told to begin, or from 0; `watched` is what the watch remembers.
+    """
 
     states: Array
     energies: Array
     failure: str
+    watched: Array
+
+
+class Begun(NamedTuple):
+    """What there is before a stretch: the energies so far, and what the stepper's watch remembers."""
+
+    energies: Array
+    watched: Watched
 
 
 def smooth_stretch(
-    rhs: cs.Function, x: Array, u: Array, p: Array, instants: Array, tolerance: float
+    rhs: cs.Function,
+    x: Array,
+    u: Array,
+    p: Array,
+    instants: Array,
+    tolerance: float,
+    stepper: FixedStep | None = None,
+    begun: Begun | None = None,
 ) -> Stretch:
     """Integrate ẋ, powers = rhs(x, u, p) with constant u by CVODES (BDF), to `instants` after the start.
 
@@ -45,16 +69,41 @@ def smooth_stretch(
     ----------
     instants: Increasing times > 0 [s].
     tolerance: Relative tolerance; the absolute one is a hundredth of it.
+    stepper: Has the watch, which sees the start, the instants and `CHECK`ed times between.
     """
-    integrator = _cvodes(rhs, tuple(instants.tolist()), tolerance)
-    states = np.full((instants.size, x.size), np.nan)
-    energies = np.full((instants.size, rhs.size1_out(1)), np.nan)
+    times, asked = _checked(instants) if stepper is not None else (instants, np.arange(instants.size))
+    integrator = _cvodes(rhs, tuple(times.tolist()), tolerance)
+    states = np.full((times.size, x.size), np.nan)
+    energies = np.full((times.size, rhs.size1_out(1)), np.nan)
     failure = _evaluate(
         integrator,
         {"x0": x, "p": np.concatenate([u, p])},
         {"xf": states.reshape(-1), "qf": energies.reshape(-1)},
     )
-    return Stretch(states, energies, failure)
+    if stepper is None or begun is None:
+        return Stretch(states, energies, failure, np.zeros(0))
+    energies += begun.energies
+    seen = np.vstack([np.concatenate([x, begun.energies]), np.hstack([states, energies])])
+    time = begun.watched.time + np.concatenate([[0.0], times])
+    watched = stepper.watch_rows(begun.watched, time, seen, u) if not failure else begun.watched.memory
+    return Stretch(states[asked], energies[asked], failure, watched)
+
+
+def around(time: float, apart: float, end: float) -> Array:
+    """Return instants around one of a stretch [s] that was looked at so far apart; its extremum is between them."""
+    return np.linspace(max(time - apart, FIRST_CHECK), min(time + apart, end), CLOSER)
+
+
+def _checked(instants: Array) -> tuple[Array, NDArray[np.intp]]:
+    """Return the times at which a smooth stretch is looked at, and which of them are the instants."""
+    end = float(instants[-1])
+    early = FIRST_CHECK * 2.0 ** np.arange(np.ceil(np.log2(CHECK / FIRST_CHECK)))
+    times = np.concatenate([early, np.arange(CHECK, end, max(CHECK, end / MOST_CHECKS))])
+    after = np.minimum(np.searchsorted(instants, times), instants.size - 1)
+    before = np.maximum(after - 1, 0)
+    gap = np.minimum(np.abs(instants[after] - times), np.abs(instants[before] - times))
+    times = np.union1d(times[(times < end) & (gap > FIRST_CHECK / 10)], instants)
+    return times, np.searchsorted(times, instants)
 
 
 @lru_cache(maxsize=64)
@@ -97,6 +146,7 @@ def held_stretch(
     period: float,
     rows: Array,
     share: float = SAFETY,
+    begun: Begun | None = None,
 ) -> Stretch:
     """Integrate under inputs held for `period` each, with the step taken from the fastest pole at the start.
 
@@ -106,35 +156,47 @@ def held_stretch(
     rows: Numbers of periods after which to record, ≥ 1.
     share: Of the stability limit.
     """
+    energies, watched = begun or (np.zeros(stepper.n_q), None)
     pole = fastest_pole(stepper.rhs, x, held[0], p)
     if refused := _too_fast(pole, period * len(held), share):
-        return _lost_from_the_start(rows.size, stepper, refused)
+        return _lost_from_the_start(rows.size, stepper, refused, begun)
     substeps = stable_step(pole, period, share)
-    result = stepper.advance(x, np.zeros(stepper.n_q), held, p, period, substeps, refine=REFINE)
-    return Stretch(result.states[rows], result.quads[rows], _lost(result.completed, len(held), period))
+    done = stepper.advance(x, energies, held, p, period, substeps, refine=REFINE, watched=watched)
+    lost = _lost(done.completed, len(held), period)
+    return Stretch(done.states[rows], done.quads[rows], lost, done.watched)
 
 
 def resolved_stretch(
-    stepper: FixedStep, x: Array, u: Array, p: Array, instants: Array, pole: float, share: float = RESOLVED
+    stepper: FixedStep,
+    x: Array,
+    u: Array,
+    p: Array,
+    instants: Array,
+    pole: float,
+    share: float = RESOLVED,
+    begun: Begun | None = None,
 ) -> Stretch:
     """Integrate with constant u by Runge-Kutta 4, at a share of the stability limit of the fastest pole [1/s]."""
+    total, watched = begun or (np.zeros(stepper.n_q), None)
     if refused := _too_fast(pole, float(instants[-1]), share):
-        return _lost_from_the_start(instants.size, stepper, refused)
-    states, energies, total = [], [], np.zeros(stepper.n_q)
+        return _lost_from_the_start(instants.size, stepper, refused, begun)
+    states, energies = [], []
     elapsed = 0.0
     for period, count in _even(np.diff(instants, prepend=0.0)):
-        substeps = stable_step(pole, period, share)
-        result = stepper.advance(x, total, np.tile(u, (count, 1)), p, period, substeps)
-        states.append(result.states[1:])
-        energies.append(result.quads[1:])
-        if lost := _lost(result.completed, count, period, elapsed):
+        substeps, held = stable_step(pole, period, share), np.tile(u, (count, 1))
+        done = stepper.advance(x, total, held, p, period, substeps, watched=watched)
+        states.append(done.states[1:])
+        energies.append(done.quads[1:])
+        if lost := _lost(done.completed, count, period, elapsed):
             rest = instants.size - sum(map(len, states))
             states.append(np.full((rest, x.size), np.nan))
             energies.append(np.full((rest, stepper.n_q), np.nan))
-            return Stretch(np.vstack(states), np.vstack(energies), lost)
+            return Stretch(np.vstack(states), np.vstack(energies), lost, done.watched)
         elapsed += count * period
-        x, total = result.states[-1], result.quads[-1]
-    return Stretch(np.vstack(states), np.vstack(energies), "")
+        x, total = done.states[-1], done.quads[-1]
+        if watched is not None:
+            watched = Watched(done.watched, watched.p, watched.time + count * period)
+    return Stretch(np.vstack(states), np.vstack(energies), "", done.watched)
 
 
 def share_for(share: float, tolerance: float) -> float:
@@ -161,8 +223,9 @@ def _too_fast(pole: float, duration: float, share: float) -> str:
     return f"the fastest pole, {pole:.3g} 1/s, needs {steps:.2g} steps; {MOST_STEPS} are taken at most"
 
 
-def _lost_from_the_start(count: int, stepper: FixedStep, why: str) -> Stretch:
-    return Stretch(np.full((count, stepper.n_x), np.nan), np.full((count, stepper.n_q), np.nan), why)
+def _lost_from_the_start(count: int, stepper: FixedStep, why: str, begun: Begun | None) -> Stretch:
+    states, energies = (np.full((count, size), np.nan) for size in (stepper.n_x, stepper.n_q))
+    return Stretch(states, energies, why, np.zeros(0) if begun is None else begun.watched.memory)
 
 
 def _lost(completed: int, count: int, period: float, elapsed: float = 0.0) -> str:

@@ -19,6 +19,8 @@ from passiflex.errors import RunFileError
 from passiflex.files import whole_file
 from passiflex.layout import Field, Layout
 from passiflex.simulation.run_file import FORMAT, cut_short, defects, foreign, require_file, unreadable
+from passiflex.simulation.unbooked import UNKNOWN, unbooked
+from passiflex.simulation.witness import Noted
 
 if TYPE_CHECKING:
     from passiflex.simulation.problem import Problem
@@ -46,8 +48,9 @@ class Run:
 
     Attributes
     ----------
-    data: All signals over time; every variable has the attributes `units` and `long_name`. Energies
-        (`*_energy`) are in J since the start, powers (`*_power`) in W.
+    data: All signals over time, and what was noted at every step between the rows (`Witness.extremes`); every
+        variable has the attributes `units` and `long_name`. Energies (`*_energy`) are in J since the start,
+        powers (`*_power`) in W.
     """
 
     data: xr.Dataset
@@ -73,6 +76,11 @@ class Run:
         return str(self.data.attrs["failure"]) or cut_short(self.data)
 
     @property
+    def unbooked(self) -> str:
+        """Return what the law's books do not know in this run, in words."""
+        return str(self.data.attrs.get("unbooked", UNKNOWN))
+
+    @property
     def events(self) -> list[dict[str, Any]]:
         """Return what happened at single instants, as the jumps of the reference and what they cost."""
         return list(json.loads(self.data.attrs["events"]))
@@ -93,7 +101,8 @@ class Run:
     def save(self, path: str | Path) -> Path:
         """Write one netCDF4 file, whole or not at all, and return its path."""
         path = Path(path)
-        compressed = {v: {"zlib": True, "complevel": 4, "shuffle": True} for v in self.data.data_vars}
+        rows = [v for v, values in self.data.data_vars.items() if values.ndim]
+        compressed = {v: {"zlib": True, "complevel": 4, "shuffle": True} for v in rows}
         with whole_file(path) as temporary:
             self.data.to_netcdf(temporary, engine="h5netcdf", encoding=compressed)
         return path
@@ -152,8 +161,9 @@ def assemble(
     recorded: Sequence[Rows],
     events: list[dict[str, Any]],
     failure: str,
+    noted: Noted,
 ) -> Run:
-    """Return the run of recorded rows."""
+    """Return the run of recorded rows, and of what was noted at every step."""
     variables: dict[str, Any] = {}
     for layout, numbers, suffix in recorded:
         values = layout.unpack(numbers)
@@ -161,6 +171,9 @@ def assemble(
             variables[f.name + suffix] = (
                 _dims(f), values[f.name], {"units": f.unit, "long_name": f.meaning},
             )  # fmt: skip
+    for f in noted.layout:
+        about = {"units": f.unit, "long_name": f.meaning}
+        variables[f.name] = (("joint",) * len(f.shape), noted.values[f.name], about)
     n, robot = problem.law.robot.n, problem.law.robot
     angle, speed, torque = robot.arm.chain.joint_units
     for name, limit, unit in (
@@ -183,6 +196,7 @@ def assemble(
         "configuration": problem.configuration,
         "sources": json.dumps(robot.sources, ensure_ascii=False),
         "seed": problem.seed,
+        "unbooked": unbooked(problem),
         "has_tank": int(problem.law.has_tank),
         "control_period": problem.sampling.period if problem.sampling else 0.0,
         "version": package_version(),

@@ -11,6 +11,7 @@ import casadi as cs
 
 from passiflex.control.signals import Measurement
 from passiflex.layout import Field, Layout
+from passiflex.native import Watch
 from passiflex.robots.arm import EndEffectorPose
 from passiflex.sampled.controller import SampledController
 from passiflex.sampled.motors import limit_layout, limited
@@ -18,6 +19,7 @@ from passiflex.sampled.sensors import Sensors
 from passiflex.sampled.signals import ControlParameters, Wish
 from passiflex.simulation.period_row import PeriodRow
 from passiflex.simulation.plant import PLANT_ENERGIES, SURROUNDINGS, Plant
+from passiflex.simulation.witness import Instant, Witness
 
 
 class Parts(NamedTuple):
@@ -41,7 +43,8 @@ class SampledLoop:
     """Plant and controller as functions of flat vectors, ready for code generation.
 
     `plant.rhs` is the plant; `control` is (x, c, row, p) → (c, command, signals), one period; `outputs` is
-    (x, command, surroundings, p) → what is true then; `period` makes the rows.
+    (x, command, surroundings, p) → what is true then; `period` makes the rows; `watch` is
+    the witness at work.
     """
 
     controller: SampledController
@@ -127,6 +130,7 @@ class SampledLoop:
                 Field("motor_kinetic_energy", (), "J", "½ θ̇ᵀ B θ̇"),
                 Field("joint_spring_energy", (), "J", "½ (θ−q)ᵀ K (θ−q)"),
                 Field("potential_energy", (), "J", "V(q)"),
+                Field("carried_energy", (), "J", "V̂(q) of the law's model, where the links really are"),
             )
         ) + Layout(
             tuple(Field(f"{f.name}_power", (), "W", f"rate of {f.name}_energy") for f in PLANT_ENERGIES)
@@ -199,7 +203,8 @@ class SampledLoop:
         state, command = cs.SX.sym("x", 4 * robot.n), cs.SX.sym("command", robot.n)
         surroundings, s = SURROUNDINGS.symbols("s")
         p = cs.SX.sym("p", sum(part.size for part in self.parameters))
-        m, x = _views(self.parameters, p).plant, self.plant.view(state)
+        views, x = _views(self.parameters, p), self.plant.view(state)
+        m = views.plant
         torques = self.plant.torques(x, s, m)
         _, powers = self.plant.rhs(state, cs.vertcat(command, surroundings), p[: self.parameters.plant.size])
         pose, stretch = arm.pose(x.q, m), x.theta - x.q
@@ -213,10 +218,59 @@ class SampledLoop:
             "motor_kinetic_energy": cs.dot(x.dtheta, m.motor_inertia * x.dtheta) / 2,
             "joint_spring_energy": cs.dot(stretch, m.joint_stiffness * stretch) / 2,
             "potential_energy": arm.potential_energy(x.q, m),
+            "carried_energy": arm.potential_energy(x.q, views.model),
         }
         known = Layout(self.truth.fields[: len(values)]).stack(values)
         return cs.Function(
             "truth", [state, command, surroundings, p], [cs.densify(cs.vertcat(known, powers))], {"cse": True}
+        )
+
+    @cached_property
+    def witness(self) -> Witness:
+        """Return what notes the extremes."""
+        return Witness.of(self.controller.law.robot, has_tank=self.controller.law.has_tank, sampled=True)
+
+    @cached_property
+    def watch(self) -> Watch:
+        """Return what the witness does at a sample and at a step; its p is that of `control`, then its own."""
+        law, witness, n = self.controller.law, self.witness, self.controller.law.robot.n
+        arm, size = law.robot.arm, sum(part.size for part in self.parameters)
+        memory, w = witness.memory.symbols("w")
+        time, command, y = (
+            cs.SX.sym("time"),
+            cs.SX.sym("command", n),
+            cs.SX.sym("y", 4 * n + PLANT_ENERGIES.size),
+        )
+        controller, c = self.memory.symbols("c")
+        signals, z = self.signals.symbols("z")
+        p = cs.SX.sym("p", size + witness.parameters.size)
+        views = _views(self.parameters, p[:size])
+        x, passed = self.plant.view(y[: 4 * n]), PLANT_ENERGIES.view(y[4 * n :])
+        level = c.tank_energy if law.has_tank else -c.reference_energy  # which was lent
+        claimed = ("shaped_kinetic", "cartesian_spring", "shaped_spring", "compensated")
+        carried = arm.potential_energy(x.q, views.model)
+        now = Instant(
+            time=time,
+            q=x.q,
+            dq=x.dq,
+            tau_m=command,
+            link_kinetic=arm.kinetic_energy(x.q, x.dq, views.plant),
+            link_potential=arm.potential_energy(x.q, views.plant),
+            carried=carried,
+            external=passed.external,
+            joint=passed.joint,
+            reference=c.reference_energy,
+            storage=sum((getattr(z, f"{part}_energy") for part in claimed), z.gravity_storage),
+            books=level + c.law_storage + c.measured_port_energy + c.spilled_energy,
+            beyond=level + c.law_storage + passed.joint,
+            latched=c.latched,
+        )
+        looked = witness.look(w, now, witness.parameters.view(p[size:]))
+        glanced = witness.glance(w, time, passed.joint, carried)
+        seen = [memory, time, y, command, controller, signals, p]
+        return Watch(
+            cs.Function("look", seen, [cs.densify(looked)], {"cse": True}),
+            cs.Function("glance", [memory, time, y, p], [cs.densify(glanced)], {"cse": True}),
         )
 
 

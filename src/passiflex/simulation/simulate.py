@@ -9,20 +9,24 @@ from numpy.typing import NDArray
 
 from passiflex.control.tank import jump_cost
 from passiflex.errors import SimulationError
-from passiflex.native import fastest_pole
+from passiflex.native import Watched, fastest_pole
+from passiflex.native.stability import STABILITY_LIMIT
 from passiflex.simulation.closed_loop import ENERGIES
 from passiflex.simulation.compiled import CompiledLoop, compiled_loop
 from passiflex.simulation.integrate import (
+    CHECK,
     RESOLVED,
     SAFETY,
     SLOW_POLE,
+    Begun,
     Stretch,
+    around,
     held_stretch,
     resolved_stretch,
     share_for,
     smooth_stretch,
 )
-from passiflex.simulation.motion import MOTION, Motion, Pose, between, pose_at, shifted
+from passiflex.simulation.motion import MOTION, Motion, Pose, between, hold, pose_at, shifted
 from passiflex.simulation.problem import Event, Problem
 from passiflex.simulation.run import Rows, Run, assemble
 from passiflex.simulation.simulate_sampled import simulate_sampled
@@ -85,8 +89,8 @@ class _Simulation:
         self.state_slices = loop.state.slices
         self.p = problem.parameters
         self.noise = self._draw_noise(loop.law.robot.n)
-        self.motion: Motion | None = None
-        self.planned: Motion | None = None
+        self.planned: Motion = hold(problem.home)  # until the first event, which may be a jump
+        self.motion = self.planned
         self.began = 0.0
         zero = np.zeros(loop.law.robot.n)
         self.x = loop.state.pack(
@@ -100,6 +104,9 @@ class _Simulation:
             }
         )
         self.energies = np.zeros(ENERGIES.size)
+        witness = loop.witness
+        limits = witness.numbers(problem.law.robot, problem.tank.initial)
+        self.watched = Watched(np.zeros(witness.memory.size), np.concatenate([self.p, limits]))
         self.log: list[dict[str, float | str]] = []
         self.record = _Record(problem, self.x.size, loop.inputs.size)
 
@@ -118,8 +125,9 @@ class _Simulation:
                 record.put(rows[0], self.x, self.energies)
                 rows = rows[1:]
             stretch = self._integrate(event, u, np.append(record.time[rows], end))
-            record.put(rows, stretch.states[:-1], self.energies + stretch.energies[:-1])
-            self.x, self.energies = stretch.states[-1], self.energies + stretch.energies[-1]
+            record.put(rows, stretch.states[:-1], stretch.energies[:-1])
+            self.x, self.energies = stretch.states[-1], stretch.energies[-1]
+            self.watched = self.watched._replace(memory=stretch.watched)
             record.inputs[-1] = u
             if stretch.failure:
                 failure = stretch.failure
@@ -140,7 +148,8 @@ class _Simulation:
             Rows(ENERGIES, energies, "_energy"),
             Rows(loop.output_layout, outputs),
         ]
-        return assemble(problem, record.time[:good], recorded, self.log, failure)
+        noted = loop.witness.noted(self.watched.memory)
+        return assemble(problem, record.time[:good], recorded, self.log, failure, noted)
 
     def _draw_noise(self, n: int) -> Array | None:
         noise = self.problem.noise
@@ -160,7 +169,6 @@ class _Simulation:
         return generator.normal(0.0, np.sqrt(noise.variance), size=(periods, n))
 
     def _inputs(self, event: Event) -> Array:
-        assert self.motion is not None
         layout = self.compiled.loop.inputs
         noise = np.zeros(self.compiled.loop.law.robot.n)
         return layout.pack({**self.motion, "F_e": event.F_e, "torque_noise": noise})
@@ -168,22 +176,46 @@ class _Simulation:
     def _integrate(self, event: Event, u: Array, instants: Array) -> Stretch:
         problem, stepper = self.problem, self.compiled.fixed_step
         after = instants - event.time
+        begun = Begun(self.energies, self.watched._replace(time=event.time))
         if problem.noise is not None and self.noise is not None:
-            hold = problem.noise.hold
-            first, last = round(event.time / hold), round(instants[-1] / hold)
+            lasts = problem.noise.hold
+            first, last = round(event.time / lasts), round(instants[-1] / lasts)
             held = np.tile(u, (last - first, 1))
             held[:, self.compiled.loop.inputs.slices["torque_noise"]] = self.noise[first:last]
-            rows, share = np.round(after / hold).astype(int), share_for(SAFETY, problem.tolerance)
-            return held_stretch(stepper, self.x, held, self.p, hold, rows, share)
+            rows, share = np.round(after / lasts).astype(int), share_for(SAFETY, problem.tolerance)
+            return held_stretch(stepper, self.x, held, self.p, lasts, rows, share, begun)
         pole = fastest_pole(stepper.rhs, self.x, u, self.p)
+        share = share_for(RESOLVED, problem.tolerance)
+
+        def resolved(instants: Array, begun: Begun, share: float = share) -> Stretch:
+            return resolved_stretch(stepper, self.x, u, self.p, instants, pole, share, begun)
+
+        def smooth(instants: Array, begun: Begun) -> Stretch:
+            rhs, tolerance = self.compiled.rhs, problem.tolerance
+            return smooth_stretch(rhs, self.x, u, self.p, instants, tolerance, stepper, begun)
+
         if pole <= SLOW_POLE:
-            share = share_for(RESOLVED, problem.tolerance)
-            return resolved_stretch(stepper, self.x, u, self.p, after, pole, share)
-        smooth = smooth_stretch(self.compiled.rhs, self.x, u, self.p, after, problem.tolerance)
-        if not smooth.failure:
-            return smooth
+            apart = share * STABILITY_LIMIT / max(pole, 1 / problem.duration)
+            return self._looked_at(resolved, after, begun, apart)
+        stretch = self._looked_at(smooth, after, begun, CHECK)
         # A run that CVODES gives up on is followed to its end by steps that are merely stable.
-        return resolved_stretch(stepper, self.x, u, self.p, after, pole, SAFETY)
+        return resolved(after, begun, SAFETY) if stretch.failure else stretch
+
+    def _looked_at(
+        self, stretch: Callable[[Array, Begun], Stretch], after: Array, begun: Begun, apart: float
+    ) -> Stretch:
+        """Return a stretch; where its margin was least so far, it is looked at once more, and closer.
+
+        `apart` are the looks of the first time [s].
+        """
+        whole = stretch(after, begun)
+        time = self.compiled.loop.witness.memory.slices["least_margin_time"]
+        least = float(whole.watched[time][0]) - begun.watched.time
+        if whole.failure or least <= 0:
+            return whole
+        seen = begun._replace(watched=begun.watched._replace(memory=whole.watched))
+        closer = stretch(around(least, apart, float(after[-1])), seen)
+        return whole if closer.failure else whole._replace(watched=closer.watched)
 
     def _potential(self, motion: Motion, clock: float) -> float:
         """Return U [J] at the present state, with the reference at `clock` of `motion`."""
@@ -195,24 +227,22 @@ class _Simulation:
         return float(y[self.compiled.loop.output_layout.slices["cartesian_spring_energy"]][0])
 
     def _move_reference(self, motion: Motion, time: float) -> None:
-        """Start another motion: restart the clock, and charge the exact jump of the potential.
+        """Start another motion: restart the clock, and charge the exact jump of the potential, at the start as later.
 
         A motion is planned from where the reference should be. Where the tank has held it back, the motion
         starts from where it is, displaced by the same amount. If the tank cannot pay a whole jump, the
         reference goes as far as it can, and the motion goes on from there.
         """
         clock, planned = self.state_slices["clock"], motion
-        if self.motion is not None and self.planned is not None:
-            now = pose_at(self.motion, float(self.x[clock][0]))
-            motion = _displaced(motion, pose_at(self.planned, time - self.began), now)
-            motion = self._pay(motion, now, time)
+        now = pose_at(self.motion, float(self.x[clock][0]))
+        motion = _displaced(motion, pose_at(self.planned, time - self.began), now)
+        motion = self._pay(motion, now, time)
         self.motion = {name: np.asarray(motion[name]) for name in (f.name for f in MOTION)}
         self.planned, self.began = planned, time
         self.x[clock] = 0.0
 
     def _pay(self, motion: Motion, now: Pose, time: float) -> Motion:
         """Charge the jump from the pose `now` to the start of `motion`, and return the motion that could be paid."""
-        assert self.motion is not None
         tank, level = self.problem.tank, self.state_slices["tank_energy"]
         before = self._potential(self.motion, float(self.x[self.state_slices["clock"]][0]))
 
@@ -224,7 +254,9 @@ class _Simulation:
 
         share = 1.0
         if self.problem.law.has_tank:
-            budget = float(self.x[level][0]) - tank.floor
+            budget = max(
+                float(self.x[level][0]) - tank.floor, NOTHING
+            )  # what costs nothing is always granted
             if reached(1.0)[2] > budget:
                 share = _largest(lambda s: reached(s)[2] <= budget)
         motion, stored, cost = reached(share)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from passiflex.errors import SimulationError
 from passiflex.native import LoopState, NativeFunction, fastest_pole
-from passiflex.native.fixed_step import STABILITY_LIMIT
+from passiflex.native.stability import STABILITY_LIMIT
 from passiflex.simulation.admissible import require_stable
 from passiflex.simulation.compiled import CompiledSampledLoop, compiled_sampled_loop
 from passiflex.simulation.noise_credit import charged
@@ -19,6 +19,7 @@ from passiflex.simulation.recorded import reported, sample_parts
 from passiflex.simulation.rows import NOW
 from passiflex.simulation.rows import Rows as PeriodRows
 from passiflex.simulation.run import Rows, Run, assemble
+from passiflex.simulation.witness import Noted
 
 Array = NDArray[np.float64]
 
@@ -110,24 +111,39 @@ def _record(problem: Problem, compiled: CompiledSampledLoop) -> Run:
     rows = PeriodRows(problem, loop.period, compiled.row)
     pieces: list[list[Array]] = []
     samples, failure = sample_count(problem), ""
+    witness = loop.witness
+    p_watch = np.concatenate([s.numbers, witness.numbers(problem.law.robot, problem.tank.initial)])
     piece = max(1, PIECE // every) * every
     for first in range(0, samples, piece):
         count = min(piece, samples - first)
         told, timing = rows.take(first, count)
         done = held.advance(
-            state, told, timing, s.plant, s.numbers, s.period, longest, every, last=first + count == samples
+            state,
+            told,
+            timing,
+            s.plant,
+            s.numbers,
+            s.period,
+            longest,
+            every,
+            last=first + count == samples,
+            first=first,
+            p_watch=p_watch,
         )
         state = done.state
         good = done.completed // every + 1 if done.completed < count else None
-        seen = (done.x, done.quads, done.controller, done.command, done.signals, told[::every])
-        pieces.append([part[:good] for part in seen])
+        parts = (done.x, done.quads, done.controller, done.command, done.signals, told[::every])
+        pieces.append([part[:good] for part in parts])
         if done.completed < count:
             failure = left_finite((first + done.completed) * s.period)
             break
-    return _assemble(problem, compiled, [np.vstack(part) for part in zip(*pieces, strict=True)], failure)
+    seen = [np.vstack(part) for part in zip(*pieces, strict=True)]
+    return _assemble(problem, compiled, seen, failure, witness.noted(state.watched))
 
 
-def _assemble(problem: Problem, compiled: CompiledSampledLoop, seen: list[Array], failure: str) -> Run:
+def _assemble(
+    problem: Problem, compiled: CompiledSampledLoop, seen: list[Array], failure: str, noted: Noted
+) -> Run:
     s, parts = problem.sampling, sample_parts(compiled.loop)
     assert s is not None
     x, _, _, command, _, rows = seen
@@ -142,7 +158,7 @@ def _assemble(problem: Problem, compiled: CompiledSampledLoop, seen: list[Array]
         recorded.append(Rows(kept, numbers[:count, columns]))
     every = round(problem.output_interval / s.period)
     time: Array = np.arange(count, dtype=np.float64) * (s.period * every)
-    return assemble(problem, time, recorded, [], failure)
+    return assemble(problem, time, recorded, [], failure, noted)
 
 
 def _whole_rows(parts: list[Array]) -> int:

@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
+from passiflex.simulation.joint_extremes import JointExtremes
 from passiflex.simulation.run import AXES
+from passiflex.simulation.witness import Witness
 
 Dims = tuple[str, ...]
 
@@ -15,6 +17,11 @@ OF_TIME = ("_energy", "_power", "_storage", "_share", "_time")
 """Ends of the names of signals that are one number at each instant."""
 OF_JOINTS = ("q", "theta", "dq", "dtheta", "tau_m", "tau_a", "tau_e")
 OF_ROBOT = ("torque_limit", "velocity_limit", "lower_position_limit", "upper_position_limit")
+NOTED = {
+    f.name: ("joint",) * len(f.shape)
+    for f in Witness(JointExtremes(1, "", "", "", motors=True), has_tank=True, sampled=True).extremes
+}
+"""What was noted at every step, and its axes."""
 LARGEST = 1e30
 """No quantity of a robot is larger, in SI units; squares of it are still finite. Energies, which only add, may be."""
 
@@ -43,6 +50,8 @@ def _possible(name: str) -> tuple[Dims, ...]:
     """Return the axes that a signal of this name may have; one that is not known here may be of any usual kind."""
     if name in AXES:
         return (("time", *AXES[name]),)
+    if name in NOTED:
+        return (NOTED[name],)
     if name in OF_ROBOT:
         return (("joint",),)
     if name in OF_JOINTS:
