@@ -87,4 +87,9 @@ def nearest(name: str, known: Iterable[str]) -> list[str]:
 
 
 class UnstableLoopError(PassiflexError):
-    """A law at a control rate and delay at which its sampled loop is unstable."""
+    """A law that does not hold at its control rate and delay: in three lines its cause, a number and a remedy."""
+
+    def __init__(self, what: str, *, cause: str, number: str, remedy: str):
+        super().__init__(what, got=number, needs=cause, try_=remedy)
+        lines = [what, f"cause: {cause}", f"number: {number}", f"remedy: {remedy}"]
+        self.args = ("\n  ".join(lines),)

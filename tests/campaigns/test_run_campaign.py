@@ -285,7 +285,7 @@ def refused(error: type[PassiflexError], match: str, c: Campaign, folder: Path, 
 
 
 def test_an_unstable_loop_is_refused_before_the_start(tmp_path: Path) -> None:
-    remedy = r"try shaped_inertia: \{ratio: 0\.\d+\}, or control\.insist"
+    remedy = r"remedy: B_e of .*; or control\.insist"
     refused(UnstableLoopError, remedy, campaign(UNSTABLE), tmp_path / "out")
 
 

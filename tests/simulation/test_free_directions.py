@@ -161,14 +161,6 @@ def test_a_pose_on_five_joints_is_refused_with_what_to_do() -> None:
     )
 
 
-def test_the_rigid_law_on_five_joints_is_sent_to_a_position_task() -> None:
-    law = {k: None for k in LAW if k.startswith("shaped")} | FULL | {"type": "rigid"}
-    law["target_inertia"] = {"translation": 3, "rotation": 1}
-    with pytest.raises(ValueRangeError) as error:
-        problem(five_joints(), posture=[0.3, 0.5, 1.0, 0.4, 0.8], law=law)
-    assert str(error.value).endswith("; try task: position")
-
-
 DAMPS = "a free direction has neither stiffness nor damping: null_space_damping damps it"
 
 

@@ -1,4 +1,4 @@
-"""Which gains a rate and a delay allow: the border of stability of the sampled loop, and the refusal beyond it."""
+"""Which gains a rate and a delay allow: the borders of stability around a problem's own, and the refusal beyond."""
 
 from __future__ import annotations
 
@@ -12,7 +12,11 @@ from numpy.typing import NDArray
 from passiflex.control.law import ImpedanceLaw
 from passiflex.errors import UnstableLoopError
 from passiflex.simulation.altered import altered
-from passiflex.simulation.linear_loop import LinearLoop, Spectrum
+from passiflex.simulation.causes import Advice, advise
+from passiflex.simulation.clock_words import delay_words, hertz
+from passiflex.simulation.judgement import Judgement, judge, judged_fallback
+from passiflex.simulation.linear_loop import LinearLoop
+from passiflex.simulation.modes import Spectrum
 from passiflex.simulation.problem import Problem
 
 Array = NDArray[np.float64]
@@ -23,6 +27,8 @@ RATES = (50.0, 200e3)
 """Where borders are looked for: B_e/B, K_e/K and the control rate [Hz]."""
 PRECISION = 1e-3
 """Relative precision of a border."""
+SEEN = 1e-3
+"""[1/s] Growth of a drift that is worth a word."""
 SCAN = 24
 """Points that are tried, evenly in the logarithm, before a border is refined."""
 
@@ -32,7 +38,8 @@ class Admissible(NamedTuple):
 
     Attributes
     ----------
-    spectrum: The dominant mode of the problem's own gains.
+    judgement: Of the problem, whatever its scenario lets happen to it.
+    advice: Why it does not hold and what would; None where it does.
     rate, delay: [Hz], [s].
     stiffness_ratio, inertia_ratio: K_e/K and B_e/B of the problem, nan if they differ between joints.
     least_inertia: Smallest stable B_e/B with the problem's K_e; inf if there is none.
@@ -41,7 +48,8 @@ class Admissible(NamedTuple):
     from_rate: Rate from which the problem's gains are stable, with as many periods of delay [Hz]; inf if none.
     """
 
-    spectrum: Spectrum
+    judgement: Judgement
+    advice: Advice | None
     rate: float
     delay: float
     stiffness_ratio: float
@@ -52,8 +60,32 @@ class Admissible(NamedTuple):
     from_rate: float
 
     @property
+    def stable(self) -> bool:
+        """Return whether the problem holds."""
+        return self.judgement.stable
+
+    @property
+    def spectrum(self) -> Spectrum:
+        """Return the dominant mode of what is worst."""
+        return self.judgement.spectrum
+
+    @property
     def sentence(self) -> str:
-        """Return the answer in words."""
+        """Return the answer in words: one line, or three of cause, number and remedy."""
+        if self.advice is not None:
+            return str(self.advice)
+        mode = self.spectrum
+        drift = ""
+        if mode.drifting:
+            drift = f"; {drift_words(mode)}"
+        return (
+            f"at {hertz(self.rate)} with {delay_words(self.delay * self.rate)} your gains hold: the slowest motion "
+            f"dies out by {mode.decay:.2g} 1/s{drift}"
+        )
+
+    @property
+    def borders(self) -> str:
+        """Return the borders around the gains in words."""
         words = [f"at {hertz(self.rate)} with {delay_words(self.delay * self.rate)}:"]
         if not math.isnan(self.most_stiffness):
             low, high = INERTIA_RATIOS[0], STIFFNESS_RATIOS[1]
@@ -73,11 +105,6 @@ class Admissible(NamedTuple):
                     if border == math.inf
                     else f"any B_e down to {low:g} B is stable with {whose};"
                 )
-        if not self.spectrum.stable:
-            words.append(
-                f"your gains are unstable, joint {self.spectrum.joint} grows {self.spectrum.radius:.4g}-fold "
-                f"per period, at {self.spectrum.frequency:.0f} Hz;"
-            )
         if self.from_rate < math.inf:
             words.append(f"your gains are stable from {hertz(self.from_rate)} on")
         else:
@@ -97,17 +124,13 @@ def check(problem: Problem, rate: float | None = None, delay: float | None = Non
     """
     changed = altered(problem, rate=rate, delay=delay)
     assert changed.sampling is not None
-    return _judged(LinearLoop(changed), changed.sampling.delay)
-
-
-def _judged(loop: LinearLoop, late: float) -> Admissible:
-    """Return the answer for a loop whose commands are this late [s], whatever its law predicts over."""
-    period = loop.s.period
-    K_ratio, B_ratio = _ratios(loop.problem)
-    shaped = isinstance(loop.problem.law, ImpedanceLaw)
-    nan = math.nan
+    found, loop = judge(changed), LinearLoop(changed)
+    period, late = loop.s.period, changed.sampling.delay
+    K_ratio, B_ratio = _ratios(changed)
+    shaped, nan = isinstance(changed.law, ImpedanceLaw), math.nan
     return Admissible(
-        spectrum=loop.spectrum(period, late),
+        judgement=found,
+        advice=None if found.stable else advise(changed, found),
         rate=1 / period,
         delay=late,
         stiffness_ratio=K_ratio,
@@ -120,57 +143,37 @@ def _judged(loop: LinearLoop, late: float) -> Admissible:
 
 
 def require_stable(problem: Problem) -> None:
-    """Raise unless the linear loop and its fallback are stable, or the scenario insists.
+    """Raise unless the judge lets the problem pass. Who insists is let go on if the fallback holds.
 
     Raises
     ------
     UnstableLoopError
-        With the nearest gains that hold.
+        With cause, number and remedies that were tried.
     """
     assert problem.sampling is not None
-    if problem.sampling.insist:
+    insist = problem.sampling.insist
+    found = judged_fallback(problem) if insist else judge(problem)
+    if found is None or found.stable:
         return
-    loop = LinearLoop(problem)
-    late = {problem.sampling.delay, problem.sampling.delay + problem.sampling.jitter}
-    changes = [{"stiffness": c.stiffness, "damping": c.damping} for c in problem.sampling.gains]
-    if all(loop.radius(delay=d, gains=gains) < 1 for d in late for gains in ({}, *changes)):
-        _require_stable_fallback(loop, late)
-        return
-    if all(loop.radius(delay=d) < 1 for d in late):
-        raise UnstableLoopError(
-            f"the law of {problem.name!r} becomes unstable by its change of gains",
-            got="a K_x or D_x in `gains` that does not hold at this rate and delay",
-            needs="gains between which the loop stays stable",
-            try_="passiflex limits, which maps K_x and D_x; or control.insist: true",
-        )
-    found = _judged(loop, max(late))
-    raise UnstableLoopError(
-        f"the law is unstable at the rate and delay of {problem.name!r}",
-        got=f"radius {found.spectrum.radius:.4g} per period of {1 / found.rate:g} s, joint {found.spectrum.joint}, "
-        f"{found.spectrum.frequency:.0f} Hz",
-        needs=found.sentence,
-        try_=_remedy(found) + ", or control.insist: true",
+    what = {
+        "law": f"the law of {problem.name!r} does not hold",
+        "gains": f"the law of {problem.name!r} does not hold with the gains that it goes over to",
+        "fallback": f"the fallback of {problem.name!r} does not hold, and could not stop the arm",
+    }[found.part]
+    advice = advise(problem, found)
+    insisting = (
+        "" if insist or found.part == "fallback" else "; or control.insist: true, to run it all the same"
     )
+    raise UnstableLoopError(what, cause=advice.cause, number=advice.number, remedy=advice.remedy + insisting)
 
 
-def _require_stable_fallback(loop: LinearLoop, late: set[float]) -> None:
-    tank = loop.s.controller.tank
-    if tank is None or not tank.falls_back:
-        return
-    gains = loop.fallback()
-    loop = loop.without_actions()  # the valve of a law that has fallen back is shut
-    radius = max(loop.radius(delay=d, gains=gains) for d in late)
-    if radius < 1:
-        return
-    least = max(least_inertia(loop, 1.0, loop.s.period, d) for d in late)
-    raise UnstableLoopError(
-        f"the fallback of {loop.problem.name!r} is unstable at its rate and delay",
-        got=f"radius {radius:.4g} per period of {loop.s.period:g} s",
-        needs="a law that stops the arm at this rate and delay",
-        try_=f"control.fallback.shaped_inertia: {{ratio: {_round_up(1.2 * least):g}}}"
-        if math.isfinite(least)
-        else "a higher rate, less delay, or softer K_x and D_x in control.fallback",
-    )
+def drift_words(mode: Spectrum) -> str:
+    """Return what becomes of a self-motion that nothing holds, in words."""
+    if mode.drift > SEEN:
+        return f"nothing holds the self-motion, which drifts away by {mode.drift:.2g} 1/s"
+    if mode.undamped:
+        return "nothing holds or damps the self-motion: once pushed, it drifts on"
+    return "nothing holds the self-motion: it stays where a push leaves it"
 
 
 def least_inertia(
@@ -196,6 +199,9 @@ def least_inertia(
 def most_stiffness(loop: LinearLoop, inertia_ratio: float, period: float, delay: float) -> float:
     """Return the largest K_e/K up to which the loop is stable with B_e/B; 0 if there is none."""
     low, high = STIFFNESS_RATIOS
+    own, _ = _ratios(loop.problem)
+    if own > low and loop.radius(period, delay, shaping(loop, own, inertia_ratio)) < 1:
+        low = own  # what holds now is where the border is looked for from
     border = first_stable(
         lambda inverse: loop.radius(period, delay, shaping(loop, 1 / inverse, inertia_ratio)) < 1,
         (1 / high, 1 / low),
@@ -251,31 +257,3 @@ def _ratios(problem: Problem) -> tuple[float, float]:
     ratios = [gains[shaped] / model[own] for shaped, own in pairs]
     K, B = (float(r[0]) if np.ptp(r) <= 1e-9 * r[0] else math.nan for r in ratios)
     return K, B
-
-
-def _remedy(found: Admissible) -> str:
-    if math.isfinite(found.least_inertia):
-        return f"shaped_inertia: {{ratio: {_round_up(1.2 * found.least_inertia):g}}}"
-    if math.isfinite(found.least_inertia_unshaped):
-        return (
-            "shaped_stiffness: {ratio: 1} with shaped_inertia: "
-            f"{{ratio: {_round_up(1.2 * found.least_inertia_unshaped):g}}}"
-        )
-    return "a higher rate, less delay, or softer gains"
-
-
-def _round_up(value: float) -> float:
-    """Return the value with two digits, rounded up."""
-    step = 10 ** (math.floor(math.log10(value)) - 1)
-    return math.ceil(value / step) * step
-
-
-def hertz(rate: float) -> str:
-    """Return a rate in words."""
-    return f"{rate / 1e3:.3g} kHz" if rate >= 1e3 else f"{rate:.3g} Hz"
-
-
-def delay_words(periods: float) -> str:
-    """Return a delay in words."""
-    periods = round(periods, 9)
-    return f"{periods:g} period{'s' * (periods != 1)} of delay" if periods else "no delay"

@@ -6,9 +6,15 @@ from collections.abc import Callable
 
 from passiflex.simulation.book_cautions import book_cautions
 from passiflex.simulation.problem import Problem
+from passiflex.simulation.stability_cautions import stability_cautions
 from passiflex.simulation.turn_cautions import far_turns, large_moments
 
-CAUTIONS: tuple[Callable[[Problem], tuple[str, ...]], ...] = (far_turns, large_moments, book_cautions)
+CAUTIONS: tuple[Callable[[Problem], tuple[str, ...]], ...] = (
+    stability_cautions,
+    far_turns,
+    large_moments,
+    book_cautions,
+)
 """Who is asked, in the order in which the lines are printed."""
 
 

@@ -93,6 +93,17 @@ def compiled_sampled_loop(controller: SampledController) -> CompiledSampledLoop:
     return _built_sampled[key]
 
 
+@lru_cache(maxsize=8)
+def interpreted_sampled_loop(controller: SampledController) -> CompiledSampledLoop:
+    """Return the same without compiling anything: for a few evaluations of a loop that nobody runs yet."""
+    if structure(controller) in _built_sampled:
+        return compiled_sampled_loop(controller)
+    loop = SampledLoop(controller)
+    functions = [loop.plant.rhs, loop.control, loop.outputs, loop.period.function]
+    held = HeldLoop(loop.plant.rhs, loop.control, None)
+    return CompiledSampledLoop(loop, held, *(NativeFunction(f) for f in functions))
+
+
 def structure(controller: SampledController) -> tuple[object, ...]:
     """Return what the code of a sampled loop depends on; controllers that agree in it share compiled code."""
     law = controller.law

@@ -1,69 +1,25 @@
-"""The sampled loop near rest, as one matrix per period: which gains are stable at a rate and delay, and how fast."""
+"""The sampled loop near rest, as matrices of one period: which gains are stable at a rate and delay, and how fast."""
 
 from __future__ import annotations
 
 import dataclasses
-import math
-from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-import scipy.linalg
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from passiflex.errors import ValueRangeError
-from passiflex.sampled.motors import UNLIMITED_TORQUE
 from passiflex.simulation.altered import replaced
-from passiflex.simulation.compiled import compiled_sampled_loop
-from passiflex.simulation.loop_at_rest import loop_at_rest
+from passiflex.simulation.compiled import compiled_sampled_loop, interpreted_sampled_loop
+from passiflex.simulation.exponential import exponential
+from passiflex.simulation.law_slope import Gains, Key, LawSlope, hashable, slope
+from passiflex.simulation.loop_at_rest import Standing, standing
+from passiflex.simulation.modes import Modes, Spectrum
 from passiflex.simulation.plant import SURROUNDINGS
+from passiflex.simulation.posture import held_jacobian, posture
 from passiflex.simulation.problem import Problem
 
 Array = NDArray[np.float64]
-
-DRIFT = 1e-5
-"""An eigenvalue this close to 1 belongs to a self-motion that nothing holds or nothing damps."""
-IDEAL = {
-    "torque_offset": 0.0,
-    "link_offset": 0.0,
-    "motor_offset": 0.0,
-    "link_resolution": 0.0,
-    "motor_resolution": 0.0,
-    "torque_limit": UNLIMITED_TORQUE,
-    "torque_rate_limit": UNLIMITED_TORQUE,
-    "coulomb_friction": 0.0,
-}
-"""What has no linear approximation is left out, and constants."""
-REMEMBERED = (
-    "read_q", "read_theta", "read_dq", "read_dtheta", "read_tau_a", "read_wrench",
-    "observed_torque", "momentum", "known_torque",
-    "seen_theta", "seen_deflection", "seen_dq", "seen_ddq", "in_flight", "given_torque",
-)  # fmt: skip
-"""The memory that acts back on the command; the tank does not while it is full."""
-
-
-class Spectrum(NamedTuple):
-    """The slowest to decay, or fastest to grow, of the loop's modes.
-
-    Attributes
-    ----------
-    radius: Largest |eigenvalue| over one period, the self-motion's drift left out; stable below 1.
-    frequency: Of that mode [Hz].
-    joint: Number of the joint that moves most in it, from 1.
-    decay: Its decay rate [1/s], negative if it grows.
-    drifting: Number of eigenvalues at 1: self-motions that no spring holds, or (twice) that nothing damps.
-    """
-
-    radius: float
-    frequency: float
-    joint: int
-    decay: float
-    drifting: int
-
-    @property
-    def stable(self) -> bool:
-        """Return whether every mode decays."""
-        return self.radius < 1
 
 
 class DrivenLoop(NamedTuple):
@@ -81,67 +37,159 @@ class DrivenLoop(NamedTuple):
     D: Array
 
 
+class Timing(NamedTuple):
+    """Period and delay [s], and how many commands are on their way when the law runs.
+
+    A command arrives `part` of a period after the sample `whole` periods later.
+    """
+
+    period: float
+    delay: float
+    whole: int
+    part: float
+    lined: int
+
+    @classmethod
+    def of(cls, period: float, delay: float, least: int = 0) -> Timing:
+        """Return the timing, with room for at least so many commands."""
+        whole = int(delay / period + 1e-9)
+        part = max(delay / period - whole, 0.0)
+        part = part if part > 1e-9 else 0.0
+        return cls(period, delay, whole, part, max(whole + (part > 0), least))
+
+
 class LinearLoop:
     """The linear approximation of a sampled problem at its start, for any rate, delay and gains.
 
-    The plant is discretised exactly under held commands (matrix exponential). The derivative of the
-    period function, sensors and estimators included, is taken by central differences on the compiled
-    code, which are exact to 1e-8 here. Left out is what has no linear approximation: resolution, limits,
+    The plant is discretised exactly under held commands (matrix exponential); the law's part is its derivative
+    (`LawSlope`). Left out is what has no linear approximation: resolution, limits,
     Coulomb friction, and a tank that runs empty.
 
     A delay that is given here is the robot's: the law goes on to predict over the one that it was built
     for. Where the law is to know of it, make the loop of `altered(problem, delay=…)`.
+
+    Parameters
+    ----------
+    problem: Sampled.
+    at: Another robot or posture than the problem's own; the law knows nothing of it.
+    native: Whether to compile what is not compiled yet; without, a few evaluations are sooner done.
     """
 
-    def __init__(self, problem: Problem):
+    def __init__(self, problem: Problem, at: Standing | None = None, *, native: bool = True):
         if problem.sampling is None:
             raise ValueRangeError(
                 "the scenario has no control rate", got=problem.name, needs="`control: {rate: …}`"
             )
-        self.problem, self.s = problem, problem.sampling
-        self.compiled = compiled_sampled_loop(problem.sampling.controller)
-        loop = self.compiled.loop
+        self.problem, self.s, self.at = problem, problem.sampling, at or standing(problem)
+        self.native = native
+        build = compiled_sampled_loop if native else interpreted_sampled_loop
+        self.compiled = build(problem.sampling.controller)
         self.n = problem.law.robot.n
-        self.parts = loop.parameters
-        self.numbers = replaced(self.parts, problem.sampling.numbers, IDEAL)
-        self.remembered = np.hstack(
-            [
-                np.arange(loop.memory.size)[loop.memory.slices[f.name]]
-                for f in loop.memory
-                if f.name in REMEMBERED
-            ]
-        )
-        zero = np.zeros(self.n)
-        self.x = np.concatenate([problem.q, problem.theta, zero, zero])
+        self.parts = self.compiled.loop.parameters
+        self.law = LawSlope(problem, self.at, self.compiled)
+        self.remembered, self.x = self.law.remembered, self.law.x
         self.A, self.B = self._plant()
         self._flows: dict[float, tuple[Array, Array]] = {}
+        self._kin: LinearLoop | None = None
+        self._ran: tuple[tuple[Timing, Key], Array] | None = None
 
     def spectrum(
+        self, period: float | None = None, delay: float | None = None, gains: Gains | None = None
+    ) -> Spectrum:
+        """Return the dominant mode; period and delay [s] and gains are the problem's own unless given."""
+        T = self.s.period if period is None else period
+        modes = Modes.of(self.matrix(period, delay, gains), T, self.task_jacobian)
+        return modes.dominant(self.n, self.kinetic)
+
+    def radius(
+        self, period: float | None = None, delay: float | None = None, gains: Gains | None = None
+    ) -> float:
+        """Return the spectral radius alone, in half the time; drift is no part of it."""
+        T = self.s.period if period is None else period
+        return Modes.radius_of(self.matrix(period, delay, gains), T, self.task_jacobian)
+
+    def trembling(self, delay: float, gains: Gains, settling: float) -> float:
+        """Return the radius of what trembles, as `Modes.trembling_of` has it."""
+        matrix = self.matrix(None, delay, gains)
+        return Modes.trembling_of(matrix, self.s.period, self.task_jacobian, settling)
+
+    def matrix(
         self,
         period: float | None = None,
         delay: float | None = None,
-        gains: Mapping[str, ArrayLike] | None = None,
-    ) -> Spectrum:
-        """Return the dominant mode; period and delay [s] and gains are the problem's own unless given."""
-        values, vectors = np.linalg.eig(self.matrix(period, delay, gains))
-        kept = self._kept(values)
-        worst = kept[np.argmax(np.abs(values[kept]))]
-        T = self.s.period if period is None else period
-        modulus, joints = abs(values[worst]), np.abs(vectors[: 2 * self.n, worst])
-        return Spectrum(
-            radius=float(modulus),
-            frequency=abs(float(np.angle(values[worst]))) / (2 * math.pi * T),
-            joint=int(np.argmax(joints[: self.n] + joints[self.n :])) + 1,
-            decay=-math.log(max(modulus, 1e-300)) / T,
-            drifting=values.size - kept.size,
-        )
+        gains: Gains | None = None,
+        lined: int = 0,
+    ) -> Array:
+        """Return the map of (x, what is remembered, commands on their way) over one period.
+
+        With room for at least `lined` commands, so that maps of other delays are as large.
+        """
+        timing = self._timing(period, delay, lined)
+        return self.flow(timing) @ self.runs(timing, gains)
+
+    def driven(
+        self, period: float | None = None, delay: float | None = None, gains: Gains | None = None
+    ) -> DrivenLoop:
+        """Return the same with the noise of the torque sensors, and the command that it makes."""
+        timing = self._timing(period, delay)
+        flow, ran = self.flow(timing), self.runs(timing, gains, noise=True)
+        size = flow.shape[0]
+        sent = ran[self._told : self._told + self.n]
+        return DrivenLoop(flow @ ran[:, :size], flow @ ran[:, size:], sent[:, :size], sent[:, size:])
+
+    def runs(
+        self, timing: Timing, gains: Gains | None = None, elapsed: float | None = None, *, noise: bool = False
+    ) -> Array:
+        """Return what the law does at a sample: (x, memory, commands) → the same with its own command first.
+
+        `elapsed` [s] is the time since it last ran, one period unless given. With noise, further columns.
+        """
+        law = self._control(timing.period, elapsed or timing.period, dict(gains or {}), noise)
+        n, told = self.n, self._told
+        heard = law.shape[1] - told
+        out = np.zeros((told + (timing.lined + 1) * n, told + timing.lined * n + heard))
+        out[: self.x.size, : self.x.size] = np.eye(self.x.size)
+        out[self.x.size : told + n, :told] = law[:, :told]
+        out[self.x.size : told + n, told + timing.lined * n :] = law[:, told:]
+        out[told + n :, told : told + timing.lined * n] = np.eye(timing.lined * n)
+        return out
+
+    def misses(self, timing: Timing) -> Array:
+        """Return what a sample does at which the law does not run: the last command goes on, nothing is remembered."""
+        n, told = self.n, self._told
+        out = np.zeros((told + (timing.lined + 1) * n, told + timing.lined * n))
+        out[:told, :told] = np.eye(told)
+        out[told + n :, told:] = np.eye(timing.lined * n)
+        out[told : told + n, told : told + n] = np.eye(n)
+        return out
+
+    def flow(self, timing: Timing) -> Array:
+        """Return what a period does after its sample: the plant moves, the commands come nearer."""
+        n, n_x, told = self.n, self.x.size, self._told
+        out = np.zeros((told + timing.lined * n, told + (timing.lined + 1) * n))
+
+        def sent(ago: int) -> slice:
+            return slice(told + ago * n, told + (ago + 1) * n)
+
+        if timing.part:
+            early, gain_early = self._held(timing.part * timing.period)
+            rest, gain_rest = self._held((1 - timing.part) * timing.period)
+            out[:n_x, :n_x] = rest @ early
+            out[:n_x, sent(timing.whole + 1)] = rest @ gain_early
+            out[:n_x, sent(timing.whole)] += gain_rest
+        else:
+            out[:n_x, :n_x], out[:n_x, sent(timing.whole)] = self._held(timing.period)
+        out[n_x:told, n_x:told] = np.eye(told - n_x)
+        out[told:, told : told + timing.lined * n] = np.eye(timing.lined * n)
+        return out
 
     def without_actions(self) -> LinearLoop:
         """Return the loop with the tank's valve shut."""
         still = {"posture_stiffness": np.zeros(self.n)}
         numbers = replaced(self.parts, self.s.numbers, still, "actions")
         sampling = dataclasses.replace(self.s, numbers=numbers)
-        return LinearLoop(dataclasses.replace(self.problem, sampling=sampling))
+        problem = dataclasses.replace(self.problem, sampling=sampling)
+        return LinearLoop(problem, self.at, native=self.native)
 
     def fallback(self) -> dict[str, Array]:
         """Return the gains of the law that takes over when the tank is overdrawn."""
@@ -149,76 +197,57 @@ class LinearLoop:
         start = sum(part.size for part in before)
         return self.parts.fallback.unpack(self.s.numbers[start : start + self.parts.fallback.size])
 
-    def radius(
-        self,
-        period: float | None = None,
-        delay: float | None = None,
-        gains: Mapping[str, ArrayLike] | None = None,
-    ) -> float:
-        """Return the spectral radius alone, in half the time."""
-        values = np.linalg.eigvals(self.matrix(period, delay, gains))
-        return float(np.abs(values[self._kept(values)]).max())
+    def beside(self, at: Standing) -> LinearLoop:
+        """Return the loop of another robot at the same posture, which makes its law's derivative from this one's.
 
-    def matrix(
-        self,
-        period: float | None = None,
-        delay: float | None = None,
-        gains: Mapping[str, ArrayLike] | None = None,
-    ) -> Array:
-        """Return the map of (x, what is remembered, commands on their way) over one period."""
-        return self._period(period, delay, gains, noise=False).A
+        The law sees the robot by its readings only: K and D of τ_a = K (θ − q) + D (θ̇ − q̇). Exact where no weight
+        is carried; where one is, the law's point of rest is taken to be this one's.
+        """
+        other = LinearLoop(self.problem, at, native=self.native)
+        other._kin = self
+        return other
 
-    def driven(
-        self,
-        period: float | None = None,
-        delay: float | None = None,
-        gains: Mapping[str, ArrayLike] | None = None,
-    ) -> DrivenLoop:
-        """Return the same with the noise of the torque sensors, and the command that it makes."""
-        return self._period(period, delay, gains, noise=True)
+    def after(self, vectors: NDArray[Any], delay: float, gains: Gains, lined: int) -> NDArray[Any]:
+        """Return what a period makes of some vectors, `matrix` times them; quicker than the matrix for a few."""
+        timing = self._timing(None, delay, lined)
+        base = self._kin or self
+        key = (timing, hashable(gains))
+        if base._ran is None or base._ran[0] != key:
+            base._ran = key, base.runs(timing, gains)
+        ran = base._ran[1] @ vectors
+        if self._kin is not None:
+            heard = base.law.by(timing.period, timing.period, gains)[:, self._told :]
+            seen = heard @ ((self.law.torque - base.law.torque) @ vectors[: self.x.size])
+            ran[self.x.size : self._told + self.n] += seen
+        return np.asarray(self.flow(timing) @ ran)
 
-    def _period(
-        self,
-        period: float | None,
-        delay: float | None,
-        gains: Mapping[str, ArrayLike] | None,
-        *,
-        noise: bool,
-    ) -> DrivenLoop:
+    @property
+    def task_jacobian(self) -> Array:
+        """Return the task's Jacobian here (k, n), its lengths in units of the arm's reach."""
+        return self._arm[0]
+
+    @property
+    def kinetic(self) -> Array:
+        """Return the inertia of links and motors (2n,): what each joint moves, the others held [kg m²]."""
+        return self._arm[1]
+
+    @property
+    def _arm(self) -> tuple[Array, Array]:
+        numbers = self.parts.plant.unpack(self.at.plant)
+        here = posture(self.problem.law.robot, self.at.q, numbers)
+        task, J = self.problem.law.task, held_jacobian(self.problem.law.task, here)
+        reach = max(float(np.linalg.norm(here.jacobian[:3], axis=0).max()), 1e-12)
+        J = J / np.array([reach if axis < 3 else 1.0 for axis in task.held])[:, None]
+        return J, np.concatenate([np.diag(here.mass_matrix), numbers["motor_inertia"]])
+
+    @property
+    def _told(self) -> int:
+        """Return the size of (x, what is remembered)."""
+        return self.x.size + self.remembered.size
+
+    def _timing(self, period: float | None, delay: float | None, lined: int = 0) -> Timing:
         T = self.s.period if period is None else period
-        late = self.s.delay if delay is None else delay
-        whole = int(late / T + 1e-9)
-        part = max(late / T - whole, 0.0)
-        slope = self._control(T, dict(gains or {}), noise)  # (memory, command) by (x, memory, noise)
-        n_x, n_c, n = self.x.size, self.remembered.size, self.n
-        lined = whole + (part > 1e-9)
-        size = n_x + n_c + lined * n
-        told, heard = slice(0, n_x + n_c), slice(size, size + slope.shape[1] - n_x - n_c)
-        command = np.zeros((n, heard.stop))
-        command[:, told], command[:, heard] = slope[n_c:, told], slope[n_c:, n_x + n_c :]
-        # The command of this period, then those of the periods before it.
-        sent = [command] + [np.eye(n, heard.stop, n_x + n_c + i * n) for i in range(lined)]
-        out = np.zeros((size, heard.stop))
-        if part > 1e-9:
-            early, gain_early = self._held(part * T)
-            rest, gain_rest = self._held((1 - part) * T)
-            out[:n_x, :n_x] = rest @ early
-            out[:n_x] += rest @ gain_early @ sent[whole + 1] + gain_rest @ sent[whole]
-        else:
-            step, gain = self._held(T)
-            out[:n_x, :n_x] = step
-            out[:n_x] += gain @ sent[whole]
-        remembers = slice(n_x, n_x + n_c)
-        out[remembers, told], out[remembers, heard] = slope[:n_c, told], slope[:n_c, n_x + n_c :]
-        for i in range(lined):
-            out[n_x + n_c + i * n : n_x + n_c + (i + 1) * n] = sent[i]
-        return DrivenLoop(out[:, :size], out[:, size:], command[:, :size], command[:, size:])
-
-    def _kept(self, values: NDArray[Any]) -> NDArray[np.intp]:
-        """Return which eigenvalues are not those of a self-motion's drift."""
-        free = 2 * (self.n - min(self.n, self.problem.law.task.size))
-        near = np.argsort(np.abs(values - 1))[:free]
-        return np.setdiff1d(np.arange(values.size), near[np.abs(values[near] - 1) < DRIFT])
+        return Timing.of(T, self.s.delay if delay is None else delay, lined)
 
     def _held(self, time: float) -> tuple[Array, Array]:
         """Return Φ and Γ of the plant over `time` under a held command."""
@@ -226,45 +255,31 @@ class LinearLoop:
             n_x = self.x.size
             block = np.zeros((n_x + self.n, n_x + self.n))
             block[:n_x, :n_x], block[:n_x, n_x:] = self.A, self.B
-            whole = scipy.linalg.expm(block * time)
+            whole = exponential(block * time)
             self._flows[time] = whole[:n_x, :n_x], whole[:n_x, n_x:]
         return self._flows[time]
 
     def _plant(self) -> tuple[Array, Array]:
         """Return A and B of the plant at rest."""
         numbers = self.parts.plant.pack(
-            self.parts.plant.unpack(self.s.plant) | {"coulomb_friction": np.zeros(self.n)}
+            self.parts.plant.unpack(self.at.plant) | {"coulomb_friction": np.zeros(self.n)}
         )
-        u = np.concatenate([self.s.held, np.zeros(SURROUNDINGS.size)])
+        u = np.concatenate([self.at.held, np.zeros(SURROUNDINGS.size)])
         plant = self.compiled.plant
-        A = _slope(lambda x: plant.map(x, u, numbers)[0], self.x)
-        B = _slope(lambda v: plant.map(self.x, v, numbers)[0], u)[:, : self.n]
+        A = slope(lambda x: plant.map(x, u, numbers)[0], self.x)
+
+        def pushed(torques: Array) -> Array:
+            calm = np.tile(u[self.n :], (len(torques), 1))
+            return plant.map(self.x, np.hstack([torques, calm]), numbers)[0]
+
+        B = slope(pushed, u[: self.n])
         return A, B
 
-    def _control(self, period: float, gains: Mapping[str, ArrayLike], noise: bool) -> Array:
-        """Return the derivative of (memory, command) by (x, memory, and noise if wanted) of one period at rest."""
-        control, told = self.compiled.control, self.compiled.loop.row.slices["torque_noise"]
-        own = self.parts.gains.unpack(self.problem.gains) | {k: np.asarray(v) for k, v in gains.items()}
-        memory, row, phi = loop_at_rest(self.problem, self.compiled.loop, own, period)
-        numbers = replaced(self.parts, self.numbers, own, "gains")
-        numbers = replaced(self.parts, numbers, {"period": period}, "inner")
-        numbers = replaced(self.parts, numbers, {"posture": phi}, "actions")  # at rest, that spring is slack
-        n_x, n_c = self.x.size, self.remembered.size
-
-        def evaluate(points: Array) -> Array:
-            memories = np.tile(memory, (len(points), 1))
-            memories[:, self.remembered] = points[:, n_x : n_x + n_c]
-            rows = np.tile(row, (len(points), 1))
-            rows[:, told] += points[:, n_x + n_c :] if noise else 0.0
-            after, command, _ = control.map(points[:, :n_x], memories, rows, numbers)
-            return np.hstack([after[:, self.remembered], command])
-
-        unheard = np.zeros(self.n if noise else 0)
-        return _slope(evaluate, np.concatenate([self.x, memory[self.remembered], unheard]))
-
-
-def _slope(f: Callable[[Array], Array], x: Array) -> Array:
-    """Return ∂f/∂x (m, n) by central differences; f maps rows to rows."""
-    h = np.cbrt(np.finfo(float).eps) * np.maximum(np.abs(x), 1.0) / 10
-    values = f(np.vstack([x + np.diag(h), x - np.diag(h)]))
-    return ((values[: x.size] - values[x.size :]) / (2 * h[:, None])).T
+    def _control(self, period: float, elapsed: float, gains: Gains, noise: bool) -> Array:
+        """Return the law's derivative, by the noise too if wanted."""
+        kin = self._kin
+        found = (kin or self).law.by(period, elapsed, gains)
+        if kin is not None:
+            found = found.copy()
+            found[:, : self.x.size] += found[:, self._told :] @ (self.law.torque - kin.law.torque)
+        return found if noise else found[:, : self._told]

@@ -1,4 +1,4 @@
-"""A sampled loop that has been at rest at its start for long: what its controller remembers and is told."""
+"""A sampled loop that has been at rest for long: where it stands, what its controller remembers and is told."""
 
 from __future__ import annotations
 
@@ -20,6 +20,18 @@ BRIMFUL = 1e6
 """Level [J] of a tank that holds nothing back."""
 
 
+class Standing(NamedTuple):
+    """A robot at rest under its weight: q, θ (n,), the motor torque that holds it (n,), and its numbers.
+
+    `plant` is flat, as `Plant.parameters`.
+    """
+
+    q: Array
+    theta: Array
+    held: Array
+    plant: Array
+
+
 class AtRest(NamedTuple):
     """Memory and row of a period at rest, flat: `SampledLoop.memory` and `SampledLoop.row`; and φ (n,)."""
 
@@ -28,37 +40,51 @@ class AtRest(NamedTuple):
     phi: Array
 
 
-def loop_at_rest(problem: Problem, loop: SampledLoop, gains: Mapping[str, Array], period: float) -> AtRest:
-    """Return what a period finds and leaves unchanged, with the gains in place of the problem's and a full tank."""
-    p, s = problem, problem.sampling
+def standing(problem: Problem, q: Array | None = None, plant: Mapping[str, Array] | None = None) -> Standing:
+    """Return the problem's robot at rest: at its start, or at another q; itself, or with other numbers (by name)."""
+    s = problem.sampling
     assert s is not None
-    model, plant = loop.parameters.model.unpack(p.model), loop.parameters.plant.unpack(s.plant)
+    if q is None and not plant:
+        return Standing(problem.q, problem.theta, s.held, s.plant)
+    layout = SampledLoop(s.controller).plant.parameters
+    true = layout.unpack(s.plant) | dict(plant or {})
+    where = problem.q if q is None else q
+    weight = posture(problem.law.robot, where, true).gravity_torque
+    return Standing(where, where + weight / true["joint_stiffness"], weight, layout.pack(true))
+
+
+def loop_at_rest(
+    problem: Problem, loop: SampledLoop, gains: Mapping[str, Array], period: float, at: Standing | None = None
+) -> AtRest:
+    """Return what a period finds and leaves unchanged, with the gains in place of the problem's and a full tank."""
+    p, at = problem, at or standing(problem)
+    model, plant = loop.parameters.model.unpack(p.model), loop.parameters.plant.unpack(at.plant)
     K = model["joint_stiffness"]
-    stretch = p.theta - p.q
+    stretch = at.theta - at.q
     shaped = (
-        p.theta if isinstance(p.law, RigidImpedanceLaw) else p.q + K / gains["shaped_stiffness"] * stretch
+        at.theta if isinstance(p.law, RigidImpedanceLaw) else at.q + K / gains["shaped_stiffness"] * stretch
     )
     home = posture(p.law.robot, shaped, model).pose
     tau_a = plant["joint_stiffness"] * stretch
-    weight = posture(p.law.robot, p.q, model).gravity_torque
+    weight = posture(p.law.robot, at.q, model).gravity_torque
     known: dict[str, Any] = {
         "started": 1.0,
-        "read_q": p.q,
-        "read_theta": p.theta,
+        "read_q": at.q,
+        "read_theta": at.theta,
         "read_tau_a": tau_a,
         "governed_position": home.position,
         "governed_rotation": home.rotation,
         "held_stiffness": gains["stiffness"],
         "tank_energy": BRIMFUL,
-        "last_q": p.q,
+        "last_q": at.q,
         "last_tau_a": tau_a,
         "known_torque": tau_a - weight,
         "observing": 1.0,
         "seen": 1.0,
-        "seen_theta": p.theta,
+        "seen_theta": at.theta,
         "seen_deflection": tau_a / K,
-        "last_command": s.held,
-        "given_torque": s.held,
+        "last_command": at.held,
+        "given_torque": at.held,
     }
     row: dict[str, Any] = {
         "desired_position": home.position,
@@ -67,7 +93,7 @@ def loop_at_rest(problem: Problem, loop: SampledLoop, gains: Mapping[str, Array]
         "desired_damping": gains["damping"],
         "elapsed": period,
     }
-    known |= {f.name: np.tile(s.held, (f.shape[0], 1)) for f in loop.memory if f.name == "in_flight"}
+    known |= {f.name: np.tile(at.held, (f.shape[0], 1)) for f in loop.memory if f.name == "in_flight"}
     return AtRest(_packed(loop.memory, known), _packed(loop.row, row), shaped)
 
 

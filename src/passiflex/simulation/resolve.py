@@ -41,7 +41,6 @@ SCALED = {
 """Entry of `deviations` and `model_errors` → the numbers of `FlexibleJointRobot.layout` that it scales."""
 SLOWEST_CONTRACTION = 0.1
 """Largest |∇²V| / K_e for the static compensation: its eight steps then reach 1e-8 of the weight."""
-FREE_DIRECTIONS = "stiffness and damping 0 in them, as rotation: [30, 30, 0]"
 REGULAR = 1e-6
 """Regularisation [1/kg] from which a law may start in a singular posture; the default only guards round-off."""
 
@@ -145,8 +144,7 @@ def _refuse_too_few(law: AbstractLaw) -> None:
             f"task 'pose' holds {held} directions, more than robot {law.robot.name!r} can move in",
             got=f"{law.robot.n} joints",
             needs="at least as many joints as directions that are held",
-            try_="task: position"
-            + ("" if isinstance(law, RigidImpedanceLaw) else f", or free directions: {FREE_DIRECTIONS}"),
+            try_="task: position, or free directions: stiffness and damping 0 in them, as rotation: [30, 30, 0]",
         )
 
 

@@ -19,7 +19,10 @@ from passiflex.sampled.sensors import Sensors
 from passiflex.sampled.signals import ControlParameters, Wish
 from passiflex.simulation.period_row import PeriodRow
 from passiflex.simulation.plant import PLANT_ENERGIES, SURROUNDINGS, Plant
-from passiflex.simulation.witness import Instant, Witness
+from passiflex.simulation.witness import LARGEST, Instant, Witness
+
+AT_ONCE = 1e-7
+"""Two instants closer than this are one [s], after millions of periods; a law claims a level when it reads."""
 
 
 class Parts(NamedTuple):
@@ -262,7 +265,7 @@ class SampledLoop:
             reference=c.reference_energy,
             storage=sum((getattr(z, f"{part}_energy") for part in claimed), z.gravity_storage),
             books=level + c.law_storage + c.measured_port_energy + c.spilled_energy,
-            beyond=level + c.law_storage + passed.joint,
+            beyond=cs.if_else(time - c.read_time < AT_ONCE, level + c.law_storage + passed.joint, -LARGEST),
             latched=c.latched,
         )
         looked = witness.look(w, now, witness.parameters.view(p[size:]))

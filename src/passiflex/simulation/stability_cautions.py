@@ -1,0 +1,23 @@
+"""What is worth a word of a loop's stability before it runs: drift that nothing damps, a law that is insisted on."""
+
+from __future__ import annotations
+
+from passiflex.simulation.admissible import SEEN, drift_words
+from passiflex.simulation.linear_loop import LinearLoop
+from passiflex.simulation.problem import Problem
+
+
+def stability_cautions(problem: Problem) -> tuple[str, ...]:
+    """Return a line on a self-motion that drifts on, and one on a law that runs although it does not hold."""
+    if problem.sampling is None:
+        return ()
+    loop, lines = LinearLoop(problem), []
+    mode = loop.spectrum(delay=loop.s.delay + loop.s.jitter)
+    if mode.undamped or mode.drift > SEEN:
+        lines.append(drift_words(mode) + "; null_space_damping or actions.posture_stiffness ends it")
+    if loop.s.insist and not mode.stable:
+        lines.append(
+            f"the law is insisted on and does not hold: joint {mode.joint}, {mode.frequency:.0f} Hz, "
+            f"{mode.radius:.4g} per period; whatever the tank says, it trembles until it falls back"
+        )
+    return tuple(lines)
