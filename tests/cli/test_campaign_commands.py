@@ -135,7 +135,7 @@ def test_what_campaign_refuses(shell: Shell, small: Path, tmp_path: Path) -> Non
         (
             "unstable.yaml",
             (),
-            "the law is unstable at the rate and delay of 'planar'; .*control.insist: true",
+            "the law of 'planar' does not hold\n  cause: .*\n  number: .*\n  remedy: .*control.insist: true",
         ),
         ("small.yaml", ("--workers", -1), "number of worker processes; got -1; needs ≥ 1"),
         ("small.yaml", ("--samples", 0), "number of samples; got 0; needs 1 to 1000000"),

@@ -92,6 +92,7 @@ def test_the_map_agrees_with_the_sentence() -> None:
     above = shaped.vertical > answer.least_inertia
     np.testing.assert_array_equal(shaped.radius[one] < 1, above)
     assert found().sentence == answer.sentence == check(problem()).sentence
+    assert answer.borders == check(problem()).borders
 
 
 def test_the_stable_damping_has_two_ends() -> None:
@@ -147,7 +148,7 @@ def test_a_matched_loop_predicts_over_each_delay_of_the_map() -> None:
 def test_without_confirmation_nothing_is_simulated(monkeypatch: pytest.MonkeyPatch) -> None:
     from passiflex.limits import confirmation
 
-    monkeypatch.setattr(confirmation, "simulate_problem", lambda problem: pytest.fail("simulated"))
+    monkeypatch.setattr(confirmation, "simulate_unchecked", lambda problem: pytest.fail("simulated"))
     assert limit_map(problem(), confirmed=False).confirmations == ()
 
 

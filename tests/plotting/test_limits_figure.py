@@ -13,10 +13,12 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from passiflex.limits import Admissible, Confirmation, LimitMap
+from passiflex.limits.own_margin import OwnMargin
 from passiflex.limits.planes import Interval, Plane
 from passiflex.plotting.figures import save_figure
 from passiflex.plotting.limits import draw_limits
-from passiflex.simulation.linear_loop import Spectrum
+from passiflex.simulation.judgement import Judgement
+from passiflex.simulation.modes import Spectrum
 
 RATIOS, INERTIAS = np.array([0.5, 1.0, 2.0]), np.array([0.01, 0.1, 1.0])
 SCALES, DAMPINGS = np.array([0.1, 1.0, 10.0]), np.array([0.1, 1.0, 10.0, 100.0])
@@ -30,13 +32,26 @@ POINTS = (
     Confirmation("rate", 2000.0, 0.04, 1.1, 0.7),
 )
 
+ANSWER = Admissible(
+    Judgement(Spectrum(0.99, 1, 1, 1, 0), "law", 1000.0, 1e-3),
+    None,
+    1000.0,
+    1e-3,
+    1.0,
+    0.3,
+    0.1,
+    1.5,
+    0.1,
+    300.0,
+)
+
 
 def found(**changes: Any) -> LimitMap:
     radius = np.geomspace(0.9, 6, 9).reshape(3, 3)
     told: dict[str, Any] = {
         "name": "test",
         "robot": "arm",
-        "admissible": Admissible(Spectrum(0.99, 1, 1, 1, 0), 1000.0, 1e-3, 1.0, 0.3, 0.1, 1.5, 0.1, 300.0),
+        "admissible": ANSWER,
         "shaping": Plane(RATIOS, INERTIAS, radius),
         "impedance": Plane(SCALES, DAMPINGS, np.geomspace(0.9, 6, 12).reshape(3, 4)),
         "delays": np.array([0.0, 1.0, 2.0]),
@@ -47,6 +62,7 @@ def found(**changes: Any) -> LimitMap:
         "radius_by_rate": 1 - BY_RATE / 10,
         "own_shaping": np.array([[1.0, 1.0], [0.3, 0.5]]),
         "confirmations": POINTS,
+        "margin": OwnMargin(0.2, ""),
     }
     return LimitMap(**told | changes)
 
@@ -120,7 +136,7 @@ def test_the_legend_names_each_thing_once() -> None:
     (legend,) = figure.legends
     names = [text.get_text() for text in legend.get_texts()]
     assert len(names) == len(set(names)) == 8
-    assert figure.get_supxlabel().replace("\n", " ") == f"test, arm: {found().sentence}"
+    assert figure.get_supxlabel().replace("\n", " ") == f"test, arm: {found().admissible.borders}"
     plt.close(figure)
 
 

@@ -13,8 +13,10 @@ from passiflex.cli.terminal import app, console, progress_lines, timed
 
 if TYPE_CHECKING:
     from passiflex.passivity import Audit
-    from passiflex.simulation import Run
+    from passiflex.simulation import Problem, Run
 
+WORTH_A_WORD = 1e-6
+"""Energy [J] below which a bound is round-off."""
 EXIT = {"passive": 0, "violated": 1, "inconclusive": 2}
 
 
@@ -70,11 +72,13 @@ def simulate(
             require_writable(out.parent)
             problem = resolve(read)
             for caution in cautions(problem):
-                report(f"note: {caution}")
+                console.print(f"note: {caution}", markup=False)
             report(f"{read.name}: compiling and running")
             run = simulate_problem(problem)
         if run.failure:
             console.print(f"the run ended early, at {run.time[-1]:g} s of {read.duration:g} s: {run.failure}")
+        if run.sampled:
+            _print_control(run)
         for passed in passed_limits(run):
             console.print(f"{passed}", markup=False)
         console.print(f"wrote {run.save(out)}")
@@ -132,16 +136,18 @@ def limits(
     recommend: Annotated[
         bool, cyclopts.Parameter(negative="", help="also find gains with a margin of 20 %")
     ] = False,
+    why: Annotated[
+        bool, cyclopts.Parameter(negative="", help="also all borders, and every remedy that was tried")
+    ] = False,
     out: Annotated[Path | None, cyclopts.Parameter(help="folder for limits.png and limits.pdf")] = None,
 ) -> int:
     """Say which gains a scenario's robot bears at its rate and delay: exit status 0 if its own are stable, 1 if not.
 
     A scenario in continuous time needs --rate.
     """
-    from passiflex.cli.limit_tables import border_table, confirmation_table
+    from passiflex.cli.limit_tables import border_table, confirmation_table, why_lines
     from passiflex.files import require_writable
     from passiflex.limits import limit_map
-    from passiflex.limits.recommend_for import recommend_for
     from passiflex.limits.subject import sampled_problem
 
     with timed():
@@ -149,21 +155,23 @@ def limits(
             problem = sampled_problem(scenario, rate, delay)
             if out is not None:
                 require_writable(out)
-            found = limit_map(problem, report=report)
-            advice = recommend_for(problem, report=report) if recommend else None
-        console.print(found.sentence)
+            found = limit_map(problem, pictured=out is not None, report=report)
+        console.print(found.sentence, markup=False)
+        if found.admissible.stable:
+            console.print(found.margin.words)
+        for line in why_lines(found) if why else ():
+            console.print(line, markup=False)
         console.print(border_table(found))
         console.print(confirmation_table(found))
-        if advice is not None:
-            console.print(f"recommended: {advice.sentence}")
-            console.print(advice.snippet, markup=False)
+        if recommend:
+            _print_recommendation(problem)
         if out is not None:
             from passiflex.plotting.figures import save_figure
             from passiflex.plotting.limits import draw_limits
 
             for path in save_figure(draw_limits(found), out / "limits"):
                 console.print(f"wrote {path}")
-    return 0 if found.admissible.spectrum.stable else 1
+    return 0 if found.admissible.stable else 1
 
 
 @app.command
@@ -189,6 +197,21 @@ def _wrong_books(run: Run, result: Audit) -> str:
     return f"the law's own books are wrong by up to {result.books_error:.3g} J{why}"
 
 
+def _print_recommendation(problem: Problem) -> None:
+    """Print gains with a margin, or why there are none."""
+    from passiflex.errors import ValueRangeError
+    from passiflex.limits.recommend_for import recommend_for
+
+    try:
+        with progress_lines() as report:
+            advice = recommend_for(problem, report=report)
+    except ValueRangeError as nothing:
+        console.print(f"recommended: nothing; {nothing}", markup=False)
+        return
+    console.print(f"recommended: {advice.sentence}", markup=False)
+    console.print(advice.snippet, markup=False)
+
+
 def _print_control(run: Run) -> None:
     """Print what governor and fallback did."""
     governed, latched = run["governed_time"][-1], run["latched"] > 0
@@ -200,8 +223,8 @@ def _print_control(run: Run) -> None:
         console.print(f"the law fell back at {fell:.4g} s and held the pose it was in")
     if run["faults"][-1] > 0:
         console.print(f"{run['faults'][-1]:.0f} measurements were not finite, and changed nothing")
-    if "measurement_bound" in run.data and run.time[-1] > 0:
-        bound = run["measurement_bound"][-1]
+    bound = float(run["measurement_bound"][-1]) if run.has_tank and "measurement_bound" in run.data else 0.0
+    if bound > WORTH_A_WORD and run.time[-1] > 0:
         console.print(
             f"errors of the sensors: the tank may claim up to {bound:.3g} J too much by the end, "
             f"{bound / run.time[-1]:.2g} W on average; nothing was granted on it"

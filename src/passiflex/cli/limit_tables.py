@@ -9,7 +9,8 @@ from rich.table import Table
 
 from passiflex.limits import Confirmation, LimitMap
 from passiflex.limits.planes import within
-from passiflex.simulation.admissible import INERTIA_RATIOS, delay_words, hertz
+from passiflex.simulation.admissible import INERTIA_RATIOS
+from passiflex.simulation.clock_words import delay_words, hertz
 
 SHOWN = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0)
 """K_e/K of the table."""
@@ -28,6 +29,15 @@ def border_table(found: LimitMap) -> Table:
         if np.isclose(ratio, SHOWN).any():
             table.add_row(f"{ratio:g}", *(_border(float(b)) for b in borders))
     return table
+
+
+def why_lines(found: LimitMap) -> list[str]:
+    """Return the borders around the gains, and each remedy with what to write."""
+    lines, advice = [found.admissible.borders], found.admissible.advice
+    for remedy in advice.remedies if advice else ():
+        written = f": {remedy.entry}" if remedy.entry else ""
+        lines.append(f"remedy that was tried: {remedy.words}{written}")
+    return lines
 
 
 def confirmation_table(found: LimitMap) -> Table:

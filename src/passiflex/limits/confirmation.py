@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 from collections.abc import Mapping
 from typing import NamedTuple
@@ -12,13 +13,16 @@ from numpy.typing import NDArray
 
 from passiflex.control.tank import NO_CAP
 from passiflex.errors import ValueRangeError
-from passiflex.simulation import Problem, simulate_problem
+from passiflex.layout import Layout
+from passiflex.simulation import Problem
 from passiflex.simulation.altered import altered, replaced
-from passiflex.simulation.linear_loop import IDEAL, LinearLoop
+from passiflex.simulation.law_slope import IDEAL
+from passiflex.simulation.linear_loop import LinearLoop
 from passiflex.simulation.loop_at_rest import BRIMFUL
 from passiflex.simulation.motion import hold
-from passiflex.simulation.problem import Event
-from passiflex.simulation.sampled_loop import SampledLoop
+from passiflex.simulation.problem import Event, Noise
+from passiflex.simulation.sampled_loop import Parts, SampledLoop
+from passiflex.simulation.simulate_sampled import simulate_unchecked
 
 Array = NDArray[np.float64]
 
@@ -29,6 +33,10 @@ PUSHED = 10
 PERIODS = 2000
 """Periods of a simulation: a mode that grows `VISIBLE`-fold per period grows 1.2-fold from third to third."""
 VISIBLE = 1.0003
+CALM, NEARLY = 0.35, 0.95
+"""Largest torque off its rest, rms, as a share of a motor's limit, and the share of it that is near."""
+FADING, QUIET = 0.8, 0.05
+"""Without noise: by how much the torque falls from third to third at least, unless below that share of a limit."""
 SEEN = 10.0
 """Growth since the push that settles the matter; the motion is then still small enough for linear theory."""
 
@@ -114,6 +122,51 @@ def disturbed(problem: Problem, periods: int = PERIODS) -> Problem:
     )
 
 
+def settled(problem: Problem, plant: Mapping[str, Array], late: float, variance: float) -> bool:
+    """Return whether a robot of a box comes to rest after a push, with its sensors, limits and noise.
+
+    Nothing trembles on: over the last third of the run no motor's torque is off its rest by more than `CALM`
+    of its limit, rms, or ever near the limit, and without noise it dies out. A limit cycle in which a tank
+    stays full fails here; the tank itself is left aside.
+
+    Parameters
+    ----------
+    problem: With the gains in question, at the robot's posture.
+    plant: Numbers of the robot that are off, of which the law knows nothing.
+    late: How late its commands are [s]; the law goes on to expect its own delay.
+    variance: Of the torque sensors' noise [(N m)²].
+    """
+    changed = altered(problem, plant=plant)
+    own, s = disturbed(changed), changed.sampling
+    assert s is not None
+    assert own.sampling is not None
+    robot = problem.law.robot
+    parts = SampledLoop(s.controller).parameters
+    real = {
+        name: values
+        for part in (parts.sensors, parts.limits)
+        for name, values in part.unpack(_of_part(parts, s.numbers, part)).items()
+    }
+    limit = np.minimum(np.asarray(real["torque_limit"]), robot.torque_limit)
+    numbers = replaced(parts, own.sampling.numbers, real | {"torque_limit": limit})
+    sampling = dataclasses.replace(own.sampling, delay=late, numbers=numbers)
+    noise = Noise(variance, s.period) if variance else None
+    run = simulate_unchecked(dataclasses.replace(own, sampling=sampling, noise=noise))
+    if run.failure:
+        return False
+    third = len(run.time) // 3
+    off = np.abs(run["tau_m"] - s.held)
+    middle, end = (np.sqrt(np.mean(part**2, axis=0)) for part in (off[third : 2 * third], off[2 * third :]))
+    dies_out = variance > 0 or bool((end <= np.maximum(FADING * middle, QUIET * limit)).all())
+    near = np.abs(run["tau_m"][2 * third :]).max(axis=0) >= np.maximum(NEARLY * limit, 1.05 * np.abs(s.held))
+    return dies_out and bool((end <= CALM * limit).all()) and not near.any()
+
+
+def _of_part(parts: Parts, numbers: Array, wanted: Layout) -> Array:
+    start = sum(part.size for part in itertools.takewhile(lambda part: part is not wanted, parts))
+    return numbers[start : start + wanted.size]
+
+
 def growth(problem: Problem) -> float:
     """Return by how much the motion of a disturbed problem grows: inf if it left the finite numbers.
 
@@ -122,7 +175,7 @@ def growth(problem: Problem) -> float:
     value is then that ratio, whatever becomes of it far away. Otherwise the value is its root mean square
     over the last third of the run, relative to the middle third.
     """
-    run = simulate_problem(problem)
+    run = simulate_unchecked(problem)
     if run.failure:
         return math.inf
     jolt = np.linalg.norm(np.diff(run["dtheta"], n=2, axis=0), axis=1)

@@ -5,12 +5,14 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from passiflex.control.law import ImpedanceLaw
 from passiflex.limits.confirmation import Confirmation, confirm
+from passiflex.limits.own_margin import OwnMargin, own_margin
 from passiflex.limits.planes import (
     Interval,
     Plane,
@@ -39,6 +41,27 @@ DAMPING_SCALES = np.geomspace(0.01, 100, 25)
 """Multiples of K_x and D_x of the impedance plane; 1 is one of them."""
 RATES = np.geomspace(250, 32_000, 15)
 """[Hz]"""
+
+
+class Grids(NamedTuple):
+    """Where a map is looked at: K_e/K, B_e/B, multiples of K_x and of D_x, and rates [Hz]."""
+
+    stiffness_ratios: Array
+    inertia_ratios: Array
+    stiffness_scales: Array
+    damping_scales: Array
+    rates: Array
+
+
+PICTURED = Grids(STIFFNESS_RATIOS, INERTIA_RATIOS, STIFFNESS_SCALES, DAMPING_SCALES, RATES)
+TOLD = Grids(
+    np.array([0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0]),
+    np.zeros(0),
+    np.array([1.0, 10.0]),
+    DAMPING_SCALES,
+    RATES[:0],
+)
+"""For a picture, and for the tables alone."""
 PERIODS = (0.0, 1.0, 2.0)
 """Delays that are compared, beside the problem's own."""
 
@@ -62,6 +85,7 @@ class LimitMap:
     radius_by_rate: Radius of the problem's own gains (d, r).
     own_shaping: K_e/K and B_e/B of each joint, (2, n); None for the rigid law.
     confirmations: Points on both sides of the borders, and the problem's own, by theory and by simulation.
+    margin: How far the robot may be off before its own gains no longer hold.
     """
 
     name: str
@@ -77,6 +101,7 @@ class LimitMap:
     radius_by_rate: Array
     own_shaping: Array | None
     confirmations: tuple[Confirmation, ...]
+    margin: OwnMargin
 
     @property
     def sentence(self) -> str:
@@ -96,6 +121,7 @@ def limit_map(
     delay: float | str | None = None,
     *,
     confirmed: bool = True,
+    pictured: bool = True,
     report: Report = lambda text: None,
 ) -> LimitMap:
     """Return the limit map of a scenario, its file or a problem, at its own rate and delay unless given.
@@ -106,6 +132,7 @@ def limit_map(
     ----------
     rate, delay: [Hz], [s]; text may name a unit.
     confirmed: Whether to simulate points on both sides of the borders.
+    pictured: Whether the map is to be drawn; without, only what the tables say is looked at.
     report: Is told what is being done.
 
     Raises
@@ -120,8 +147,10 @@ def limit_map(
     own = LinearLoop(problem)
     shaped = isinstance(problem.law, ImpedanceLaw)
     report(f"{name}: radii over the gains")
-    planes = shaping_plane(own, STIFFNESS_RATIOS, INERTIA_RATIOS) if shaped else None
-    impedance = impedance_plane(own, STIFFNESS_SCALES, DAMPING_SCALES)
+    grids = PICTURED if pictured else TOLD
+    rates = grids.rates if shaped or pictured else RATES  # of the rigid law they are what there is to tell
+    planes = shaping_plane(own, grids.stiffness_ratios, grids.inertia_ratios) if shaped else None
+    impedance = impedance_plane(own, grids.stiffness_scales, grids.damping_scales)
     delays = np.unique(np.round([*PERIODS, problem.sampling.delay / period], 9))
     report(f"{name}: borders at other delays and rates")
     loops = [LinearLoop(altered(problem, delay=d * period)) for d in delays]
@@ -132,17 +161,18 @@ def limit_map(
         shaping=planes,
         impedance=impedance,
         delays=delays,
-        least_inertia=np.array([least_inertias(loop, STIFFNESS_RATIOS) for loop in loops])
+        least_inertia=np.array([least_inertias(loop, grids.stiffness_ratios) for loop in loops])
         if shaped
         else None,
         damping=stable_damping(own, impedance),
-        rates=RATES,
+        rates=rates,
         least_inertia_by_rate=(
-            np.array([least_inertias_by_rate(loop, RATES) for loop in loops]) if shaped else None
+            np.array([least_inertias_by_rate(loop, rates) for loop in loops]) if shaped else None
         ),
-        radius_by_rate=np.array([radii_by_rate(loop, RATES) for loop in loops]),
+        radius_by_rate=np.array([radii_by_rate(loop, rates) for loop in loops]),
         own_shaping=_own_shaping(problem) if shaped else None,
         confirmations=(),
+        margin=own_margin(problem),
     )
     if not confirmed:
         return found

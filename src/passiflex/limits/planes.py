@@ -96,7 +96,7 @@ def within(border: float) -> bool:
 
 def _plane(horizontal: Array, vertical: Array, radius: Callable[[float, float], float]) -> Plane:
     radii = [[radius(float(x), float(y)) for y in vertical] for x in horizontal]
-    return Plane(horizontal, vertical, np.array(radii))
+    return Plane(horizontal, vertical, np.array(radii).reshape(horizontal.size, vertical.size))
 
 
 def _stretch(

@@ -1,17 +1,16 @@
-"""Gains with a margin for the law of a scenario: its robot, task, K_x, D_x, sensors and inner loop."""
+"""Gains with a margin for the law of a scenario: its robot, task, K_x, D_x, sensors, jitter and missed periods."""
 
 from __future__ import annotations
 
 import numpy as np
-import yaml
 
 from passiflex.control.law import ImpedanceLaw
 from passiflex.errors import ValueRangeError
-from passiflex.limits.recommend import Report, recommend
+from passiflex.limits.recommend import Report, recommend_gains
 from passiflex.limits.recommendation import Recommendation
 from passiflex.limits.subject import Subject, sampled_problem
 from passiflex.limits.workspace import workspace_postures
-from passiflex.sampled.matched_loop import MatchedInnerLoop
+from passiflex.simulation.altered import rewritten
 
 TORQUE_NOISE = 0.2
 """Variance [(N m)²] where the scenario has no noise: that of the paper's Fig. 3."""
@@ -23,9 +22,12 @@ def recommend_for(
     rate: float | str | None = None,
     delay: float | str | None = None,
     *,
+    inner_loop: str | None = None,
     report: Report = lambda text: None,
 ) -> Recommendation:
     """Return `recommend` for a scenario, its file or a problem, its start among the postures.
+
+    What it returns is a piece of that scenario: pasted into it, `simulate` and `limits` accept it.
 
     Raises
     ------
@@ -33,26 +35,20 @@ def recommend_for(
         For the rigid law, which shapes nothing; and as `recommend`.
     """
     problem = sampled_problem(subject, rate, delay)
-    s, law = problem.sampling, problem.law
-    assert s is not None
+    law = problem.law
     if not isinstance(law, ImpedanceLaw):
         raise ValueRangeError(
             "the rigid law has no K_e and B_e to recommend", got=problem.name, needs="law type: impedance"
         )
     gains = law.layout.unpack(problem.gains)
-    size = law.task.size
-    return recommend(
+    written = {name: {"matrix": gains[name].tolist()} for name in ("stiffness", "damping")}
+    text = rewritten(problem.configuration, {"law": written})
+    return recommend_gains(
+        text,
         law.robot,
-        1 / s.period,
-        s.delay,
+        np.vstack([problem.q, workspace_postures(law.robot, law.task)]),
         margin,
-        task="pose" if size == 6 else "position",
-        inner_loop="matched" if isinstance(s.controller.inner, MatchedInnerLoop) else "plain",
-        stiffness=gains["stiffness"],
-        damping=gains["damping"],
-        null_space_damping=float(gains["null_space_damping"]),
-        torque_noise=problem.noise.variance if problem.noise else TORQUE_NOISE,
-        sensors=yaml.safe_load(problem.configuration).get("sensors"),
-        postures=np.vstack([problem.q, workspace_postures(law.robot, size)]),
+        problem.noise.variance if problem.noise else TORQUE_NOISE,
+        inner_loop=inner_loop,
         report=report,
     )

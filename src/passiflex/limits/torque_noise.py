@@ -2,40 +2,64 @@
 
 from __future__ import annotations
 
+import math
+from typing import Any
+
 import numpy as np
-import scipy.linalg
 from numpy.typing import NDArray
 
-from passiflex.simulation.linear_loop import DRIFT, DrivenLoop
+from passiflex.simulation.law_slope import Gains
+from passiflex.simulation.linear_loop import DrivenLoop, LinearLoop
+from passiflex.simulation.missed import stationary
+from passiflex.simulation.modes import coupled, drift_of, projector
 
 Array = NDArray[np.float64]
+Values = NDArray[Any]
+
+NONE: Values = np.zeros(0, dtype=complex)
+SLOW = 1.0
+"""Frequency [Hz] below which a torque is no noise."""
 
 
-def torque_by_noise(loop: DrivenLoop, variance: float) -> Array:
+def torque_by_noise(
+    loop: LinearLoop, variance: float, delay: float | None = None, gains: Gains | None = None
+) -> Array:
     """Return the rms motor torque (n,) [N m] by white noise of this variance [(N m)²] on each sensor.
 
-    z⁺ = A z + G w with τ = C z + D w has the covariance P = A P Aᵀ + σ² G Gᵀ, and τ the variances
-    diag(C P Cᵀ + σ² D Dᵀ). Eigenvalues at 1 belong to a self-motion that drifts and calls for no torque: that
-    part is taken out first. inf if the rest is not stable.
+    Of the torque what is faster than `SLOW`: the weight that a slow self-motion shifts between the joints is no
+    noise of a motor. inf if the loop is not stable.
     """
-    A, G, C = _without_drift(loop)
-    if A.size and np.abs(np.linalg.eigvals(A)).max() >= 1:
-        return np.full(len(C), np.inf)
-    P = scipy.linalg.solve_discrete_lyapunov(A, G @ G.T)
-    return np.sqrt(variance * np.diag(C @ P @ C.T + loop.D @ loop.D.T))
+    driven = loop.driven(None, delay, gains)
+    kept = coupled(driven.A).kept
+    tight = DrivenLoop(driven.A[np.ix_(kept, kept)], driven.G[kept], driven.C[:, kept], driven.D)
+    values = np.linalg.eigvals(tight.A)
+    drift = drift_of(tight.A, values, loop.s.period, loop.task_jacobian)
+    if np.abs(values[~drift]).max(initial=0.0) >= 1:
+        return np.full(len(driven.C), np.inf)
+    return rms_torque(quick(tight, loop.s.period), variance, values[drift])
 
 
-def _without_drift(loop: DrivenLoop) -> tuple[Array, Array, Array]:
-    """Return A, G, C of the part that does not drift: an ordered Schur form, its two blocks decoupled."""
-    T, Z, size = scipy.linalg.schur(
-        loop.A, output="real", sort=lambda re, im: float(np.hypot(re - 1, im)) >= DRIFT
+def quick(loop: DrivenLoop, period: float) -> DrivenLoop:
+    """Return the loop with the command less its own low-pass of pole `SLOW` in place of the command."""
+    A, G, C, D = loop
+    share, n = 1 - math.exp(-2 * math.pi * SLOW * period), len(C)
+    return DrivenLoop(
+        np.block([[A, np.zeros((len(A), n))], [share * C, (1 - share) * np.eye(n)]]),
+        np.vstack([G, share * D]),
+        np.hstack([C, -np.eye(n)]),
+        D,
     )
-    first, rest = slice(0, size), slice(size, None)
-    # s = z₁ + X z₂ evolves by itself if T₁₁ X − X T₂₂ = T₁₂.
-    X = (
-        scipy.linalg.solve_sylvester(T[first, first], -T[rest, rest], T[first, rest])
-        if size < len(T)
-        else np.zeros((size, 0))
-    )
-    G = Z.T @ loop.G
-    return T[first, first], G[first] + X @ G[rest], loop.C @ Z[:, first]
+
+
+def rms_torque(loop: DrivenLoop, variance: float, drift: Values = NONE) -> Array:
+    """Return the rms of τ by white noise w, where all eigenvalues but those of a drift are stable.
+
+    z⁺ = A z + G w with τ = C z + D w has the covariance P = A P Aᵀ + σ² G Gᵀ, and τ the variances
+    diag(C P Cᵀ + σ² D Dᵀ). What drifts is taken out first.
+    """
+    A, G, C, D = loop
+    if drift.size:
+        rest = np.eye(len(A)) - projector(A, drift)
+        A, G = A @ rest, rest @ G
+    P = stationary(A, G @ G.T)
+    return np.sqrt(variance * np.maximum(np.diag(C @ P @ C.T + D @ D.T), 0.0))

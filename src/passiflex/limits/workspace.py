@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from passiflex.control.task import AbstractTask
 from passiflex.errors import ValueRangeError
 from passiflex.robots.flexible import FlexibleJointRobot
-from passiflex.simulation.posture import posture
+from passiflex.simulation.posture import held_jacobian, posture
 
 Array = NDArray[np.float64]
 
@@ -21,8 +22,8 @@ REGULAR = 0.05
 TRIED = 512
 
 
-def workspace_postures(robot: FlexibleJointRobot, size: int, count: int = COUNT) -> Array:
-    """Return regular postures (count, n) for a task of `size` rows: always the same ones for a robot.
+def workspace_postures(robot: FlexibleJointRobot, task: AbstractTask, count: int = COUNT) -> Array:
+    """Return regular postures (count, n) for the directions that a task holds: always the same ones for a robot.
 
     They are the first of a Halton sequence over the joints' ranges that are regular.
 
@@ -38,10 +39,12 @@ def workspace_postures(robot: FlexibleJointRobot, size: int, count: int = COUNT)
     middle, half = limits.mean(axis=1), USED * np.diff(limits, axis=1)[:, 0] / 2
     sequence = qmc.Halton(robot.n, scramble=False).fast_forward(1).random(TRIED)  # the first is a corner
     points = middle + half * (2 * sequence - 1)
-    jacobians = [posture(robot, q, numbers).jacobian[:size] for q in points]
-    reach = max(float(np.linalg.norm(J[:3], axis=0).max()) for J in jacobians)
-    units = np.concatenate([np.full(3, 1 / reach), np.ones(3)])[:size, None]
-    regular = [q for q, J in zip(points, jacobians, strict=True) if _ratio(units * J) >= REGULAR]
+    places = [posture(robot, q, numbers) for q in points]
+    reach = max(float(np.linalg.norm(at.jacobian[:3], axis=0).max()) for at in places)
+    units = np.array([1 / reach if axis < 3 else 1.0 for axis in task.held])[:, None]
+    regular = [
+        q for q, at in zip(points, places, strict=True) if _ratio(units * held_jacobian(task, at)) >= REGULAR
+    ]
     if len(regular) < count:
         raise ValueRangeError(
             f"robot {robot.name!r} has too few regular postures",

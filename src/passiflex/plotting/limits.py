@@ -13,7 +13,8 @@ from passiflex.limits.confirmation import Confirmation
 from passiflex.limits.limit_map import LimitMap
 from passiflex.limits.planes import Plane
 from passiflex.plotting.style import JOINTS, axis_label, figure_style
-from passiflex.simulation.admissible import INERTIA_RATIOS, delay_words
+from passiflex.simulation.admissible import INERTIA_RATIOS
+from passiflex.simulation.clock_words import delay_words
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -64,7 +65,7 @@ def draw_limits(found: LimitMap) -> Figure:
             handles, labels = axes.get_legend_handles_labels()
             unique |= dict(zip(labels, handles, strict=True))
         figure.legend(list(unique.values()), list(unique), loc="outside upper center", ncols=4)
-        text = f"{found.name}, {found.robot}: {found.sentence}"
+        text = f"{found.name}, {found.robot}: {found.admissible.borders}"
         figure.supxlabel("\n".join(textwrap.wrap(text, 55 * panels)), fontsize=7, color="0.25")
         return figure
 
