@@ -50,10 +50,9 @@ def told(**changes: Any) -> dict[str, str]:
             "500 Hz, commands 2 ms late, jitter up to 1 ms, 0.1 of the periods missed, plain inner loop, τ_e: true",
         ),
         (
-            {"tank": {"kind": "paper", "accounting": "signed", "cap": 5, "fill": 0.5, "power": 3}},
+            {"tank": {"cap": 5, "power": 3}},
             "tank",
-            "paper's tank, 2 J at the start, T_min 0.01 J, cap 5 J, filled by 0.5 of the dissipation, at most 3 W, "
-            "signed accounting",
+            "port tank, 2 J at the start, T_min 0.1 J, cap 5 J, at most 3 W, signed accounting",
         ),
         ({"tool": {"position": [0, 0, 0.1]}}, "tool", "[0, 0, 0.1] m"),
         (

@@ -212,6 +212,6 @@ CONDITIONS = (
     "iiwa14 at 1 kHz, each command one period late; q to 0.01°, θ to 0.0001°, velocities from differences (200 Hz), "
     "noise 0.2 (N m)² on τ_a\n"
     "paper's gains: K_e = 10 K, B_e = 0.01 B, continuous law at the samples; recommended: K_e = K, "
-    "B_e = 0.03 B (wrist 0.08 B), matched inner loop\n"
+    "B_e of each joint by recommend for ±20 %, matched inner loop\n"
     "drag: 5 N s/m and 2 N against the end effector's motion from 7 s on"
 )
