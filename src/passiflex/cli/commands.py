@@ -137,7 +137,10 @@ def limits(
         bool, cyclopts.Parameter(negative="", help="also find gains with a margin of 20 %")
     ] = False,
     why: Annotated[
-        bool, cyclopts.Parameter(negative="", help="also all borders, and every remedy that was tried")
+        bool,
+        cyclopts.Parameter(
+            negative="", help="also all borders, other delays, and every remedy that was tried"
+        ),
     ] = False,
     out: Annotated[Path | None, cyclopts.Parameter(help="folder for limits.png and limits.pdf")] = None,
 ) -> int:
@@ -155,7 +158,7 @@ def limits(
             problem = sampled_problem(scenario, rate, delay)
             if out is not None:
                 require_writable(out)
-            found = limit_map(problem, pictured=out is not None, report=report)
+            found = limit_map(problem, pictured=why or out is not None, report=report)
         console.print(found.sentence, markup=False)
         if found.admissible.stable:
             console.print(found.margin.words)

@@ -132,7 +132,7 @@ def limit_map(
     ----------
     rate, delay: [Hz], [s]; text may name a unit.
     confirmed: Whether to simulate points on both sides of the borders.
-    pictured: Whether the map is to be drawn; without, only what the tables say is looked at.
+    pictured: Whether the map is to be drawn; without, only its own delay and what the tables say of it are looked at.
     report: Is told what is being done.
 
     Raises
@@ -151,9 +151,10 @@ def limit_map(
     rates = grids.rates if shaped or pictured else RATES  # of the rigid law they are what there is to tell
     planes = shaping_plane(own, grids.stiffness_ratios, grids.inertia_ratios) if shaped else None
     impedance = impedance_plane(own, grids.stiffness_scales, grids.damping_scales)
-    delays = np.unique(np.round([*PERIODS, problem.sampling.delay / period], 9))
+    compared = PERIODS if pictured else ()  # a matched loop is built anew for each delay
+    delays = np.unique(np.round([*compared, problem.sampling.delay / period], 9))
     report(f"{name}: borders at other delays and rates")
-    loops = [LinearLoop(altered(problem, delay=d * period)) for d in delays]
+    loops = [LinearLoop(altered(problem, delay=d * period)) for d in delays] if pictured else [own]
     found = LimitMap(
         name=name,
         robot=problem.law.robot.name,
