@@ -12,10 +12,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from passiflex.simulation.sampled_loop import AT_ONCE
 
-AT_ONCE = 1e-7
-"""Two instants closer than this are one [s], after millions of periods."""
+Array = NDArray[np.float64]
 
 
 class Signals(Protocol):
