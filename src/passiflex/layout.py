@@ -56,7 +56,7 @@ class Layout:
             start += f.size
         return out
 
-    @property
+    @cached_property
     def size(self) -> int:
         """Return the length of the flat vector."""
         return sum(f.size for f in self.fields)
@@ -92,10 +92,9 @@ class Layout:
         NameUnknownError, SizeError, ValueRangeError
             For a name that is missing or not in the layout, a wrong shape, a number that is not finite.
         """
-        names = [f.name for f in self.fields]
         for name in values:
             if name not in self.slices:
-                raise NameUnknownError("parameter", name, names)
+                raise NameUnknownError("parameter", name, list(self.slices))
         out = np.empty(self.size)
         for f in self.fields:
             if f.name not in values:
@@ -114,11 +113,14 @@ class Layout:
                     got=value.shape,
                     needs=f"{f.shape} in {f.unit}",
                 )
-            if not np.isfinite(value).all():
-                raise ValueRangeError(
-                    f"parameter {f.name!r} is not finite", got=value, needs=f"finite numbers in {f.unit}"
-                )
             out[self.slices[f.name]] = value.ravel()
+        if not np.isfinite(out).all():
+            f = next(f for f in self.fields if not np.isfinite(out[self.slices[f.name]]).all())
+            raise ValueRangeError(
+                f"parameter {f.name!r} is not finite",
+                got=np.asarray(values[f.name]),
+                needs=f"finite numbers in {f.unit}",
+            )
         return out
 
     def unpack(self, vector: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:

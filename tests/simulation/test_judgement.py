@@ -163,7 +163,7 @@ def test_a_heavier_flange_is_the_last_links_inertia_in_robot_and_model() -> None
         np.testing.assert_allclose(after[-1] - before[-1], [0.02, 0, 0, 0.02, 0, 0.02], atol=1e-15)
         np.testing.assert_array_equal(after[:-1], before[:-1])
     masses = [
-        np.linalg.inv(loop.A[4:6, 2:4] / layout.unpack(problem.plant)["joint_stiffness"])
+        np.linalg.inv(loop.plant[4:6, 2:4] / layout.unpack(problem.plant)["joint_stiffness"])
         for loop in (LinearLoop(problem), LinearLoop(heavier))
     ]
     np.testing.assert_allclose(

@@ -13,8 +13,9 @@ from hypothesis import strategies as st
 from passiflex.errors import UnstableLoopError
 from passiflex.simulation import resolve, simulate
 from passiflex.simulation.judgement import judge
-from passiflex.simulation.linear_loop import LinearLoop, Timing
+from passiflex.simulation.linear_loop import LinearLoop
 from passiflex.simulation.missed import _certified, dies_out, gaps, stationary
+from passiflex.simulation.timing import Timing
 from worlds import world
 
 LIGHT: dict[str, Any] = {
@@ -75,7 +76,7 @@ def test_a_missed_period_is_the_plant_under_the_last_command() -> None:
     for _ in range(2):
         z = here.flow(timing) @ here.misses(timing) @ z
     block = np.zeros((10, 10))
-    block[:8, :8], block[:8, 8:] = here.A, here.B
+    block[:8] = here.plant
     expected = scipy.linalg.expm(2e-3 * block) @ np.concatenate([x0, tau])
     np.testing.assert_allclose(z[:8], expected[:8], rtol=1e-9)
     np.testing.assert_array_equal(z[-2:], tau)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -51,19 +52,34 @@ class Attempt:
             for q in places
         )
 
-    def at(self, margin: float, *, confirmed: bool = True) -> Recommendation:
-        """Return the gains that hold with a margin.
+    def begun(self, margin: float) -> InertiaSearch:
+        """Return a search whose ratios hold on the members that mostly decide: less it cannot be.
 
         Raises
         ------
         UnattainableError
             If there are none.
         """
-        box = MarginBox(self.problems, margin)
-        search = InertiaSearch(box, self.robot, self.variance, self.inner)
+        self.report(f"{self.inner} inner loop: least B_e on a box of ±{margin:g}")
+        search = InertiaSearch(MarginBox(self.problems, margin), self.robot, self.variance, self.inner)
+        search.begin()
+        return search
+
+    def finished(
+        self, search: InertiaSearch, below: float = math.inf, *, confirmed: bool = True
+    ) -> Recommendation:
+        """Return the gains that hold on the whole box.
+
+        Raises
+        ------
+        UnattainableError
+            If there are none.
+        HeavierError
+            As soon as the mean of B_e/B is sure to be this much or more.
+        """
         for _ in range(CONFIRMED):
-            self.report(f"{self.inner} inner loop: least B_e on a box of ±{margin:g}")
-            search.run()
+            self.report(f"{self.inner} inner loop: searching the box, mean B_e {search.mean:.2g} B")
+            search.run(below)
             entry = self._entry(search)
             why = self._refused(search, entry) if confirmed else ""
             if not why:

@@ -32,12 +32,16 @@ DIGITS = 3
 """To which B_e is rounded, up."""
 QUIETER, LOUDER, NEARLY = 40, 1.25, 0.7
 """Steps up against noise, the largest of them, and the share of what is allowed from which a member is asked again."""
-ROUNDS = 12
+ROUNDS = 24
 """Searches of the box at most; each finds members that decide, or ends."""
 
 
 class UnattainableError(ValueRangeError):
     """No B_e holds on the box."""
+
+
+class HeavierError(ValueRangeError):
+    """What holds needs more B_e than another inner loop does."""
 
 
 class InertiaSearch:
@@ -55,33 +59,58 @@ class InertiaSearch:
         self.decided = ["floor"] * robot.n
         self.worst = Worst(0.0, box.centre(0))
 
-    def run(self) -> None:
-        """Find the ratios.
+    @property
+    def mean(self) -> float:
+        """Return the geometric mean of the ratios."""
+        return float(np.exp(np.log(self.ratio).mean()))
+
+    def begin(self) -> None:
+        """Bring the ratios to where the members that mostly decide hold; `run` goes on from there, and only up.
 
         Raises
         ------
         UnattainableError
             If there are none up to `MOST`.
         """
-        thorough = False
-        for i in range(ROUNDS):
-            self._settle(STEPS if i == 0 else STEPS[-1:])
-            self.floor = (
-                self.ratio.copy()
-            )  # from here on it is only raised, so that the rounds come to an end
-            places = range(len(self.box.problems))
-            found = [self.box.search(self.gains(), p, thorough=thorough) for p in places]
-            self.worst = max(found)
-            failing = [w.member for w in found if not w.stable]
-            if self.variance:
-                failing += [w.member for w in found if w.stable and self._excess(w.member).max() > 1]
+        self._settle(first=True)
+
+    def run(self, below: float = math.inf) -> None:
+        """Find the ratios, after `begin` or `raise_all`.
+
+        Raises
+        ------
+        UnattainableError
+            If there are none up to `MOST`.
+        HeavierError
+            As soon as their mean is sure to be this much or more.
+        """
+        everywhere = list(range(len(self.box.problems)))
+        places, thorough = everywhere, False
+        for _ in range(ROUNDS):
+            self._settle()
+            if self.mean >= below:
+                raise HeavierError(
+                    "this inner loop needs more B_e", got=f"{self.mean / below:.2g} times as much"
+                )
+            self.floor = self.ratio.copy()  # from now on it is only raised, so that the rounds come to an end
+            self.worst = Worst(0.0, self.box.centre(0))
+            failing = [p for p in places if not self._passes(p, thorough=thorough)]
             if not failing and thorough:
                 return
-            self.active += [m for m in failing if m not in self.active]
-            thorough = not failing
+            # Where it failed it is tried again, quickly; once nothing fails there, thoroughly everywhere.
+            places, thorough = failing or everywhere, not failing
         raise UnattainableError(
             "no B_e holds with this margin", got=f"{ROUNDS} searches that still found members"
         )
+
+    def _passes(self, posture: int, *, thorough: bool) -> bool:
+        """Return whether nothing is found at a posture that trembles or is too loud; what is found is kept."""
+        found = self.box.search(self.gains(), posture, thorough=thorough)
+        self.worst = max(self.worst, found)
+        if found.stable and not (self.variance and self._excess(found.member).max() > 1):
+            return True
+        self.active += [found.member] if found.member not in self.active else []
+        return False
 
     def raise_all(self, factor: float, why: str) -> None:
         """Raise all joints by a factor: a floor from then on."""
@@ -99,14 +128,16 @@ class InertiaSearch:
         loop, late = self.box.loop(member)
         return torque_by_noise(loop, self.variance, late, gains)
 
-    def _settle(self, steps: Sequence[float]) -> None:
+    def _settle(self, *, first: bool = False) -> None:
         """Bring the ratios to where all active members hold and none is too loud."""
+        step = STEPS[0] if first else STEPS[-1]
         while not self._holds(self.ratio, self.active):
-            factor = self._least(
-                lambda f: self._holds(np.minimum(self.ratio * f, MOST), self.active), steps[0]
-            )
+            factor = self._least(lambda f: self._holds(np.minimum(self.ratio * f, MOST), self.active), step)
             self.ratio = np.minimum(self.ratio * factor, MOST)
-            self._lower(steps)
+            if first:
+                self._lower(STEPS)
+            else:
+                self._let_go()
         asked = list(self.active) if self.variance else []
         for _ in range(QUIETER):
             excess = [self._excess(m) for m in asked]
@@ -128,14 +159,39 @@ class InertiaSearch:
         for step in steps:
             movable = self.ratio > self.floor
             while movable.any():
-                for joint in np.flatnonzero(movable):
-                    lower = self.ratio.copy()
-                    lower[joint] = max(lower[joint] * step, self.floor[joint])
+                for joint in np.flatnonzero(movable).tolist():
+                    lower = self._one(joint, max(self.ratio[joint] * step, self.floor[joint]))
                     movable[joint] = lower[joint] > self.floor[joint]
                     if self._holds(lower, self.failed):
                         self.ratio = lower
                     else:
                         movable[joint], self.decided[joint] = False, "margin"
+
+    def _let_go(self) -> None:
+        """Lower each joint as far as the members bear it: those first that the last of them minds least."""
+        newest = self.failed[0]
+
+        def with_floor(joint: int) -> float:
+            return self.box.radius(newest, self.gains(self._one(joint, self.floor[joint])), SURELY)
+
+        for joint in sorted(np.flatnonzero(self.ratio > self.floor).tolist(), key=with_floor):
+            low, high = float(self.floor[joint]), float(self.ratio[joint])
+            if self._holds(self._one(joint, low), self.failed):
+                high = low
+            else:
+                self.decided[joint] = "margin"
+            while low < STEPS[-1] * high:
+                middle = math.sqrt(low * high)
+                low, high = (
+                    (low, middle) if self._holds(self._one(joint, middle), self.failed) else (middle, high)
+                )
+            self.ratio[joint] = high
+
+    def _one(self, joint: int, value: float) -> Array:
+        """Return the ratios with one joint's replaced."""
+        ratio = self.ratio.copy()
+        ratio[joint] = value
+        return ratio
 
     def _holds(self, ratio: Array, members: list[Member]) -> bool:
         """Return whether these members hold; the one that failed last is asked first."""

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 
 from passiflex.control.law import ImpedanceLaw
 from passiflex.limits.confirmation import Confirmation, confirm
@@ -115,6 +116,7 @@ class LimitMap:
         return int(np.argmin(np.abs(self.delays - periods)))
 
 
+@threadpool_limits.wrap(limits=1)  # threads that wait for one another cost more than small matrices
 def limit_map(
     subject: Subject,
     rate: float | str | None = None,

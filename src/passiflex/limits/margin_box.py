@@ -11,17 +11,16 @@ import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-import scipy.linalg
 from numpy.typing import NDArray
 
 from passiflex.errors import ValueRangeError
+from passiflex.limits.box_slopes import steepest
 from passiflex.simulation import Problem
 from passiflex.simulation.linear_loop import LinearLoop
 from passiflex.simulation.loop_at_rest import standing
-from passiflex.simulation.modes import self_motion, trembles
 from passiflex.simulation.resolve import SCALED
 
 Array = NDArray[np.float64]
@@ -36,16 +35,13 @@ FIELDS = {
 """What can be off, joint by joint, and the numbers of the robot that go with it."""
 NEAR = 0.3
 """How far from a posture of the set each joint may be [rad, m]."""
-FOLLOWED, SLOW, LEADING = 12, 4, 3
-"""Modes that tremble and slower ones whose slopes are taken, and those of the first that are followed to corners."""
-STARTS, CLIMBS, SHARES = 2, 5, (1.0, 0.4, 0.15, 0.0)
-"""From how many members a search goes uphill, how many steps, and the shares of the coordinates that a step moves."""
+STARTS, CLIMBS, SHARES = (1, 2), (2, 5), (1.0, 0.4, 0.15, 0.0)
+"""From how many members a quick and a thorough search go uphill, how many steps, and the shares of the coordinates
+that a step moves."""
 DRAWN, SEED = 16, 20
 """Random members of each posture, and the seed of them."""
 SETTLING = 0.5
 """[1/s] Whatever trembles must die out at least this fast."""
-STEP = 1e-3
-"""Of the differences by the box's coordinates."""
 
 
 class Member(NamedTuple):
@@ -129,8 +125,7 @@ class MarginBox:
     def loop(self, member: Member) -> tuple[LinearLoop, float]:
         """Return the loop of a member, and its delay [s]."""
         if member not in self._loops:
-            problem, off = self.problems[member.posture], np.array(member.off)
-            self._loops[member] = self._standing(problem, member), self._late(off)
+            self._loops[member] = self._standing(self.problems[member.posture], member), self.late(member)
         return self._loops[member]
 
     def radius(self, member: Member, gains: Gains, settling: float = SETTLING) -> float:
@@ -145,16 +140,17 @@ class MarginBox:
     def search(self, gains: Gains, posture: int, *, thorough: bool = True) -> Worst:
         """Return the worst member that is found at a posture; thorough: with all common corners and random members."""
         centre = self.centre(posture)
-        tried = [centre, *(self._uphill(centre, s) for s in self._slopes(centre, gains))]
+        tried = [centre, *(self._uphill(centre, s) for s in steepest(self, centre, gains))]
         tried += [*self.corners(posture), *self.drawn(posture, DRAWN)] if thorough else []
         found = sorted((Worst(self.radius(m, gains), m) for m in tried), reverse=True)
-        best = max(self._climbed(start, gains) for start in found[: STARTS if thorough else 1])
+        starts, steps = STARTS[thorough], CLIMBS[thorough]
+        best = max(self._climbed(start, gains, steps) for start in found[:starts])
         return self._turned(best, gains) if thorough else best
 
-    def _climbed(self, found: Worst, gains: Gains) -> Worst:
+    def _climbed(self, found: Worst, gains: Gains, steps: int) -> Worst:
         """Return the worst member on the way uphill from one: to corners that slopes point to, or part of the way."""
-        for _ in range(CLIMBS if self.margin else 0):
-            slopes = self._slopes(found.member, gains, dominant=True)
+        for _ in range(steps if self.margin else 0):
+            slopes = steepest(self, found.member, gains, dominant=True)
             ways = {self._uphill(found.member, slope, share) for slope in slopes for share in SHARES}
             higher = max(Worst(self.radius(m, gains), m) for m in ways)
             if higher.radius <= found.radius:
@@ -213,9 +209,9 @@ class MarginBox:
             return LinearLoop(problem, at)
         return self._own(member.posture).beside(at)
 
-    def _late(self, off: Array) -> float:
+    def late(self, member: Member) -> float:
         """Return the delay [s] of a member: the jitter and so many periods around it are part of the box."""
-        s = self.problems[0].sampling
+        s, off = self.problems[0].sampling, member.off
         assert s is not None
         share, spread = off[4 * self.n], self.margin * s.period
         return max(s.delay + s.jitter * (1 + share) / 2 + spread * share, 0.0)
@@ -233,51 +229,6 @@ class MarginBox:
         moved = np.argsort(-gain)[:count]
         off[moved] = np.where(slope[moved] == 0, off[moved], np.sign(slope[moved]))
         return Member(member.posture, tuple(off.tolist()))
-
-    def _slopes(self, member: Member, gains: Gains, *, dominant: bool = False) -> list[Array]:
-        """Return ∂|λ|/∂off of the modes that could grow most within the box, or of those that are largest here."""
-        loop, late = self.loop(member)
-        lined = int(late / loop.s.period + 1e-9) + 1
-        A = loop.matrix(None, late, gains, lined)
-        parts: Any = scipy.linalg.eig(A, left=True, check_finite=False)
-        values, left, right = parts
-        sizes = np.where(self_motion(values, right, loop.s.period, loop.task_jacobian), 0.0, np.abs(values))
-        sizes = np.where(values.imag < 0, 0.0, sizes)  # of a pair one is enough
-        fast = trembles(values, loop.s.period)
-        danger = np.where(fast | (sizes >= 1), sizes, 0.0)
-        quick, slow = np.argsort(-danger), np.argsort(-np.where(fast, 0.0, sizes))
-        chosen = quick[:LEADING] if dominant else np.concatenate([quick[:FOLLOWED], slow[:SLOW]])
-        values, left, right, sizes = values[chosen], left[:, chosen], right[:, chosen], sizes[chosen]
-        scale = np.sum(left.conj() * right, axis=0)
-        scale = np.where(np.abs(scale) < 1e-12, np.inf, scale)
-        slopes = np.zeros((5 * self.n + 1, values.size))
-        now = A @ right
-        for j, (after, h) in enumerate(self._nearby(member, loop, gains, lined, right)):
-            change = np.sum(left.conj() * (after - now), axis=0) / scale / h
-            slopes[j] = np.real(change * values.conj()) / np.maximum(sizes, 1e-12)
-        if dominant:
-            return list(slopes.T)
-        reach = sizes + np.abs(slopes).sum(axis=0)
-        first, last = np.argsort(-reach[:FOLLOWED])[:LEADING], FOLLOWED + np.argsort(-reach[FOLLOWED:])[:1]
-        return [slopes[:, i] for i in np.concatenate([first, last])]
-
-    def _nearby(
-        self, member: Member, loop: LinearLoop, gains: Gains, lined: int, vectors: NDArray[Any]
-    ) -> Iterator[tuple[NDArray[Any], float]]:
-        """Yield what a period makes of vectors a step into the box along each coordinate, and that step."""
-        problem, n = self.problems[member.posture], self.n
-        for j in range(5 * n + 1):
-            h = STEP if member.off[j] <= 0 else -STEP
-            off = list(member.off)
-            off[j] += h
-            beside = Member(member.posture, tuple(off))
-            late = self._late(np.array(off))
-            if j == 4 * n:
-                yield loop.after(vectors, late, gains, lined), h
-                continue
-            at = standing(problem, self.angles(beside), self.plant(beside))
-            other = LinearLoop(problem, at) if j > 4 * n else loop.beside(at)
-            yield other.after(vectors, late, gains, lined), h
 
 
 def _signs(off: Array) -> str:

@@ -11,11 +11,12 @@ from typing import Any
 import numpy as np
 import yaml
 from numpy.typing import ArrayLike, NDArray
+from threadpoolctl import threadpool_limits
 
 from passiflex.control.task import AbstractTask, PoseTask, PositionTask
 from passiflex.errors import NameUnknownError, SizeError, ValueRangeError
 from passiflex.limits.attempt import Attempt, Report
-from passiflex.limits.inertia_search import FLOORS, MOST, UnattainableError
+from passiflex.limits.inertia_search import FLOORS, MOST, HeavierError, InertiaSearch, UnattainableError
 from passiflex.limits.recommendation import Recommendation
 from passiflex.limits.subject import DELAY, RATE, number
 from passiflex.limits.workspace import workspace_postures
@@ -110,6 +111,7 @@ def recommend(
     )
 
 
+@threadpool_limits.wrap(limits=1)  # threads that wait for one another cost more than small matrices
 def recommend_gains(
     scenario: str,
     robot: FlexibleJointRobot,
@@ -136,34 +138,31 @@ def recommend_gains(
         inner: Attempt(scenario, robot, places, torque_noise, inner, report)
         for inner in (ORDER if inner_loop is None else (inner_loop,))
     }
+    begun: dict[str, InertiaSearch] = {}
     for inner, attempt in tried.items():
         try:
-            found[inner] = attempt.at(margin)
+            begun[inner] = attempt.begun(margin)
         except UnattainableError as failure:
             failures[inner] = failure
+    below, others = math.inf, {k: f"holds with no B_e: {v.got}" for k, v in failures.items()}
+    for inner in sorted(begun, key=lambda k: begun[k].mean):  # the lighter one is likely to stay so
+        try:
+            found[inner] = tried[inner].finished(begun[inner], below)
+        except UnattainableError as failure:
+            failures[inner], others[inner] = failure, f"holds with no B_e: {failure.got}"
+        except HeavierError as heavier:
+            others[inner] = f"needs at least {heavier.got} B_e"
+        else:
+            below = begun[inner].mean
     if not found:
         raise _nothing(tried, failures, margin)
-    return _better(found, failures)
-
-
-def _better(found: dict[str, Recommendation], failures: Mapping[str, UnattainableError]) -> Recommendation:
-    """Return the recommendation with the lighter motors, and say what the other inner loop would need."""
-
-    def weight(r: Recommendation) -> float:
-        return float(np.log(r.inertia_ratio).mean())
-
-    best = min(found.values(), key=weight)
-    others = [r for r in found.values() if r is not best]
-    if others:
-        other = others[0]
-        share = math.exp(weight(other) - weight(best))
-        return dataclasses.replace(
-            best, other=f"the {other.inner_loop} inner loop needs {share:.2g} times the B_e"
-        )
-    if failures:
-        (inner, failure), *_ = failures.items()
-        return dataclasses.replace(best, other=f"the {inner} inner loop holds with no B_e: {failure.got}")
-    return best
+    best = min(found, key=lambda k: begun[k].mean)
+    others |= {
+        k: f"needs {begun[k].mean / begun[best].mean:.2g} times as much B_e" for k in found if k != best
+    }
+    return dataclasses.replace(
+        found[best], other="; ".join(f"the {k} inner loop {why}" for k, why in others.items())
+    )
 
 
 def _nothing(
@@ -175,7 +174,7 @@ def _nothing(
         middle = 0.0 if i == 0 else (low + high) / 2
         for inner, attempt in tried.items():
             try:
-                attempt.at(middle, confirmed=False)
+                attempt.finished(attempt.begun(middle), confirmed=False)
             except UnattainableError:
                 continue
             low, best = middle, inner

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from passiflex.sampled.motors import UNLIMITED_TORQUE
 from passiflex.simulation.altered import replaced
 from passiflex.simulation.compiled import CompiledSampledLoop
-from passiflex.simulation.loop_at_rest import Standing, loop_at_rest
+from passiflex.simulation.loop_at_rest import AT_REST, AtRest, Standing, loop_at_rest
 from passiflex.simulation.problem import Problem
 from passiflex.simulation.sampled_loop import SampledLoop
 
@@ -63,6 +63,7 @@ class LawSlope:
         self.n = problem.law.robot.n
         self.x = np.concatenate([at.q, at.theta, np.zeros(2 * self.n)])
         self._known: dict[tuple[float, float, Key], Array] = {}
+        self._rest: tuple[tuple[float, Key], AtRest] | None = None
 
     def by(self, period: float, elapsed: float, gains: Gains) -> Array:
         """Return the derivative `elapsed` seconds after the law last ran, with gains in place of the problem's."""
@@ -73,10 +74,9 @@ class LawSlope:
             self._known[key] = self._differences(period, elapsed, gains)
         return self._known[key]
 
-    @property
-    def torque(self) -> Array:
-        """Return ∂τ_a/∂x (n, 4n) of the robot, as its sensors have it before their noise."""
-        plant = self.parts.plant.unpack(self.at.plant)
+    def torque(self, at: Standing) -> Array:
+        """Return ∂τ_a/∂x (n, 4n) of a robot, as these sensors have it before their noise."""
+        plant = self.parts.plant.unpack(at.plant)
         before = sum(part.size for part in self.parts[: self.parts._fields.index("sensors")])
         sensors = self.parts.sensors.unpack(self.numbers[before : before + self.parts.sensors.size])
         seen = 1 + sensors["torque_scale"]
@@ -86,7 +86,7 @@ class LawSlope:
     def _differences(self, period: float, elapsed: float, gains: Gains) -> Array:
         control, told = self.compiled.control, self.compiled.loop.row.slices["torque_noise"]
         own = self.parts.gains.unpack(self.problem.gains) | {k: np.asarray(v) for k, v in gains.items()}
-        memory, row, phi = loop_at_rest(self.problem, self.compiled.loop, own, elapsed, self.at)
+        memory, row, phi = self._at_rest(own, elapsed)
         numbers = replaced(self.parts, self.numbers, own, "gains")
         numbers = replaced(self.parts, numbers, {"period": period}, "inner")
         numbers = replaced(self.parts, numbers, {"posture": phi}, "actions")  # at rest, that spring is slack
@@ -102,6 +102,13 @@ class LawSlope:
 
         return slope(evaluate, np.concatenate([self.x, memory[self.remembered], np.zeros(self.n)]))
 
+    def _at_rest(self, gains: Gains, elapsed: float) -> AtRest:
+        """Return where the law rests, which is asked again and again for gains that change nothing there."""
+        key = elapsed, hashable({name: gains[name] for name in AT_REST if name in gains})
+        if self._rest is None or self._rest[0] != key:
+            self._rest = key, loop_at_rest(self.problem, self.compiled.loop, gains, elapsed, self.at)
+        return self._rest[1]
+
 
 def hashable(gains: Gains) -> Key:
     """Return gains as what a dictionary may be asked for."""
@@ -111,9 +118,15 @@ def hashable(gains: Gains) -> Key:
 
 def slope(f: Callable[[Array], Array], x: Array) -> Array:
     """Return ∂f/∂x (m, n) by central differences; f maps rows to rows."""
-    h = np.cbrt(np.finfo(float).eps) * np.maximum(np.abs(x), 1.0) / 10
-    values = f(np.vstack([x + np.diag(h), x - np.diag(h)]))
+    points, h = differences(x)
+    values = f(points)
     return ((values[: x.size] - values[x.size :]) / (2 * h[:, None])).T
+
+
+def differences(x: Array) -> tuple[Array, Array]:
+    """Return the points of a central difference about x, (2n, n): all steps up, then all down; and the steps (n,)."""
+    h = np.cbrt(np.finfo(float).eps) * np.maximum(np.abs(x), 1.0) / 10
+    return np.vstack([x + np.diag(h), x - np.diag(h)]), h
 
 
 @lru_cache(maxsize=16)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,14 +14,18 @@ from passiflex.errors import ValueRangeError
 from passiflex.simulation.altered import replaced
 from passiflex.simulation.compiled import compiled_sampled_loop, interpreted_sampled_loop
 from passiflex.simulation.exponential import exponential
-from passiflex.simulation.law_slope import Gains, Key, LawSlope, hashable, slope
+from passiflex.simulation.law_slope import Gains, LawSlope, differences
 from passiflex.simulation.loop_at_rest import Standing, standing
 from passiflex.simulation.modes import Modes, Spectrum
 from passiflex.simulation.plant import SURROUNDINGS
-from passiflex.simulation.posture import held_jacobian, posture
+from passiflex.simulation.posture import held_jacobian
 from passiflex.simulation.problem import Problem
+from passiflex.simulation.timing import Timing
 
 Array = NDArray[np.float64]
+
+NODES, WEIGHTS = (np.polynomial.legendre.leggauss(4)[0] + 1) / 2, np.polynomial.legendre.leggauss(4)[1] / 2
+"""Of a quadrature over 0 to 1."""
 
 
 class DrivenLoop(NamedTuple):
@@ -35,27 +41,6 @@ class DrivenLoop(NamedTuple):
     G: Array
     C: Array
     D: Array
-
-
-class Timing(NamedTuple):
-    """Period and delay [s], and how many commands are on their way when the law runs.
-
-    A command arrives `part` of a period after the sample `whole` periods later.
-    """
-
-    period: float
-    delay: float
-    whole: int
-    part: float
-    lined: int
-
-    @classmethod
-    def of(cls, period: float, delay: float, least: int = 0) -> Timing:
-        """Return the timing, with room for at least so many commands."""
-        whole = int(delay / period + 1e-9)
-        part = max(delay / period - whole, 0.0)
-        part = part if part > 1e-9 else 0.0
-        return cls(period, delay, whole, part, max(whole + (part > 0), least))
 
 
 class LinearLoop:
@@ -88,10 +73,8 @@ class LinearLoop:
         self.parts = self.compiled.loop.parameters
         self.law = LawSlope(problem, self.at, self.compiled)
         self.remembered, self.x = self.law.remembered, self.law.x
-        self.A, self.B = self._plant()
         self._flows: dict[float, tuple[Array, Array]] = {}
         self._kin: LinearLoop | None = None
-        self._ran: tuple[tuple[Timing, Key], Array] | None = None
 
     def spectrum(
         self, period: float | None = None, delay: float | None = None, gains: Gains | None = None
@@ -207,38 +190,60 @@ class LinearLoop:
         other._kin = self
         return other
 
-    def after(self, vectors: NDArray[Any], delay: float, gains: Gains, lined: int) -> NDArray[Any]:
-        """Return what a period makes of some vectors, `matrix` times them; quicker than the matrix for a few."""
-        timing = self._timing(None, delay, lined)
-        base = self._kin or self
-        key = (timing, hashable(gains))
-        if base._ran is None or base._ran[0] != key:
-            base._ran = key, base.runs(timing, gains)
-        ran = base._ran[1] @ vectors
-        if self._kin is not None:
-            heard = base.law.by(timing.period, timing.period, gains)[:, self._told :]
-            seen = heard @ ((self.law.torque - base.law.torque) @ vectors[: self.x.size])
-            ran[self.x.size : self._told + self.n] += seen
-        return np.asarray(self.flow(timing) @ ran)
+    def heard(self, at: Standing, period: float, elapsed: float, gains: Gains) -> Array:
+        """Return what another robot's τ_a adds to the law's derivative by x: it is all that the law sees of a robot."""
+        law = (self._kin or self).law
+        by_torque = law.by(period, elapsed, gains)[:, self._told :]
+        return np.asarray(by_torque @ (law.torque(at) - law.torque(self.at)))
 
-    @property
+    def by_plant(self, timing: Timing, left: NDArray[Any], ran: NDArray[Any]) -> NDArray[Any]:
+        """Return the derivative of leftᴴ `flow` ran by the entries of [A B] of the plant (m, 4n, 5n).
+
+        With ẋ = A x + B u it is ∫ p (x, u)ᵀ dt, where ṗ = −Aᵀ p leads to `left` at the period's end; by Gauss's
+        quadrature. Columns of `left` and of `ran`, what the law leaves of a vector, go in pairs.
+        """
+        n, n_x, told = self.n, self.x.size, self._told
+        p_end, x = left[:n_x].conj().T, ran[:n_x]
+        pieces = [(timing.whole + 1, timing.part), (timing.whole, 1 - timing.part)]
+        out = np.zeros((left.shape[1], n_x, n_x + n), dtype=complex)
+        for i, (ago, share) in enumerate(pieces):
+            if not share:
+                continue
+            long, u = share * timing.period, ran[told + ago * n : told + (ago + 1) * n]
+            rest = self._held(pieces[1][1] * timing.period)[0] if i == 0 else np.eye(n_x)
+            for node, mirrored, weight in zip(NODES, NODES[::-1], WEIGHTS, strict=True):
+                moved, pushed = self._held(node * long)
+                p = p_end @ rest @ self._held(mirrored * long)[0]
+                here = np.concatenate([moved @ x + pushed @ u, u])
+                out += weight * long * np.einsum("mi,jm->mij", p, here)
+            moved, pushed = self._held(long)
+            x = moved @ x + pushed @ u
+        return out
+
+    def plants(self, others: Sequence[Standing]) -> Array:
+        """Return [A B] of other robots, or of this one elsewhere (N, 4n, 5n): all by one call of compiled code."""
+        where = [np.concatenate([at.q, at.theta, np.zeros(2 * self.n), at.held]) for at in others]
+        points, steps = zip(*(differences(x) for x in where), strict=True)
+        rows = np.vstack(points)
+        numbers = np.repeat([self._smooth(at) for at in others], len(points[0]), axis=0)
+        u = np.hstack([rows[:, self.x.size :], np.zeros((len(rows), SURROUNDINGS.size))])
+        values = self.compiled.plant.map(rows[:, : self.x.size], u, numbers)[0]
+        split = values.reshape(len(others), 2, len(steps[0]), -1)
+        change = (split[:, 0] - split[:, 1]) / (2 * np.array(steps))[:, :, None]
+        return np.asarray(change.transpose(0, 2, 1))
+
+    @cached_property
     def task_jacobian(self) -> Array:
         """Return the task's Jacobian here (k, n), its lengths in units of the arm's reach."""
-        return self._arm[0]
+        task, J = self.problem.law.task, held_jacobian(self.problem.law.task, self.at.arm)
+        reach = max(float(np.linalg.norm(self.at.arm.jacobian[:3], axis=0).max()), 1e-12)
+        return np.asarray(J / np.array([reach if axis < 3 else 1.0 for axis in task.held])[:, None])
 
     @property
     def kinetic(self) -> Array:
         """Return the inertia of links and motors (2n,): what each joint moves, the others held [kg m²]."""
-        return self._arm[1]
-
-    @property
-    def _arm(self) -> tuple[Array, Array]:
-        numbers = self.parts.plant.unpack(self.at.plant)
-        here = posture(self.problem.law.robot, self.at.q, numbers)
-        task, J = self.problem.law.task, held_jacobian(self.problem.law.task, here)
-        reach = max(float(np.linalg.norm(here.jacobian[:3], axis=0).max()), 1e-12)
-        J = J / np.array([reach if axis < 3 else 1.0 for axis in task.held])[:, None]
-        return J, np.concatenate([np.diag(here.mass_matrix), numbers["motor_inertia"]])
+        motors = self.parts.plant.unpack(self.at.plant)["motor_inertia"]
+        return np.concatenate([np.diag(self.at.arm.mass_matrix), motors])
 
     @property
     def _told(self) -> int:
@@ -249,31 +254,25 @@ class LinearLoop:
         T = self.s.period if period is None else period
         return Timing.of(T, self.s.delay if delay is None else delay, lined)
 
+    @cached_property
+    def plant(self) -> Array:
+        """Return [A B] of the plant at rest."""
+        return np.asarray(self.plants([self.at])[0])
+
+    def _smooth(self, at: Standing) -> Array:
+        """Return a robot's numbers without dry friction."""
+        layout = self.parts.plant
+        return layout.pack(layout.unpack(at.plant) | {"coulomb_friction": np.zeros(self.n)})
+
     def _held(self, time: float) -> tuple[Array, Array]:
         """Return Φ and Γ of the plant over `time` under a held command."""
         if time not in self._flows:
             n_x = self.x.size
             block = np.zeros((n_x + self.n, n_x + self.n))
-            block[:n_x, :n_x], block[:n_x, n_x:] = self.A, self.B
+            block[:n_x] = self.plant
             whole = exponential(block * time)
             self._flows[time] = whole[:n_x, :n_x], whole[:n_x, n_x:]
         return self._flows[time]
-
-    def _plant(self) -> tuple[Array, Array]:
-        """Return A and B of the plant at rest."""
-        numbers = self.parts.plant.pack(
-            self.parts.plant.unpack(self.at.plant) | {"coulomb_friction": np.zeros(self.n)}
-        )
-        u = np.concatenate([self.at.held, np.zeros(SURROUNDINGS.size)])
-        plant = self.compiled.plant
-        A = slope(lambda x: plant.map(x, u, numbers)[0], self.x)
-
-        def pushed(torques: Array) -> Array:
-            calm = np.tile(u[self.n :], (len(torques), 1))
-            return plant.map(self.x, np.hstack([torques, calm]), numbers)[0]
-
-        B = slope(pushed, u[: self.n])
-        return A, B
 
     def _control(self, period: float, elapsed: float, gains: Gains, noise: bool) -> Array:
         """Return the law's derivative, by the noise too if wanted."""
@@ -281,5 +280,5 @@ class LinearLoop:
         found = (kin or self).law.by(period, elapsed, gains)
         if kin is not None:
             found = found.copy()
-            found[:, : self.x.size] += found[:, self._told :] @ (self.law.torque - kin.law.torque)
+            found[:, : self.x.size] += kin.heard(self.at, period, elapsed, gains)
         return found if noise else found[:, : self._told]

@@ -6,11 +6,12 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from passiflex.control.rigid import RigidImpedanceLaw
 from passiflex.layout import Layout
-from passiflex.simulation.posture import posture
+from passiflex.simulation.plant import Plant
+from passiflex.simulation.posture import Posture, posture
 from passiflex.simulation.problem import Problem
 from passiflex.simulation.sampled_loop import SampledLoop
 
@@ -18,18 +19,26 @@ Array = NDArray[np.float64]
 
 BRIMFUL = 1e6
 """Level [J] of a tank that holds nothing back."""
+AT_REST = ("shaped_stiffness", "stiffness", "damping")
+"""Gains that decide where a loop rests and what it then remembers."""
 
 
 class Standing(NamedTuple):
-    """A robot at rest under its weight: q, θ (n,), the motor torque that holds it (n,), and its numbers.
+    """A robot at rest under its weight.
 
-    `plant` is flat, as `Plant.parameters`.
+    Attributes
+    ----------
+    q, theta: (n,).
+    held: The motor torque that holds it (n,) [N m].
+    plant: Its numbers, flat, as `Plant.parameters`.
+    arm: It at q, by these numbers.
     """
 
     q: Array
     theta: Array
     held: Array
     plant: Array
+    arm: Posture
 
 
 class AtRest(NamedTuple):
@@ -44,17 +53,22 @@ def standing(problem: Problem, q: Array | None = None, plant: Mapping[str, Array
     """Return the problem's robot at rest: at its start, or at another q; itself, or with other numbers (by name)."""
     s = problem.sampling
     assert s is not None
-    if q is None and not plant:
-        return Standing(problem.q, problem.theta, s.held, s.plant)
-    layout = SampledLoop(s.controller).plant.parameters
+    robot, layout = problem.law.robot, Plant(problem.law.robot).parameters
     true = layout.unpack(s.plant) | dict(plant or {})
     where = problem.q if q is None else q
-    weight = posture(problem.law.robot, where, true).gravity_torque
-    return Standing(where, where + weight / true["joint_stiffness"], weight, layout.pack(true))
+    here = posture(robot, where, true)
+    if q is None and not plant:
+        return Standing(where, problem.theta, s.held, s.plant, here)
+    weight = here.gravity_torque
+    return Standing(where, where + weight / true["joint_stiffness"], weight, layout.pack(true), here)
 
 
 def loop_at_rest(
-    problem: Problem, loop: SampledLoop, gains: Mapping[str, Array], period: float, at: Standing | None = None
+    problem: Problem,
+    loop: SampledLoop,
+    gains: Mapping[str, ArrayLike],
+    period: float,
+    at: Standing | None = None,
 ) -> AtRest:
     """Return what a period finds and leaves unchanged, with the gains in place of the problem's and a full tank."""
     p, at = problem, at or standing(problem)
@@ -62,7 +76,9 @@ def loop_at_rest(
     K = model["joint_stiffness"]
     stretch = at.theta - at.q
     shaped = (
-        at.theta if isinstance(p.law, RigidImpedanceLaw) else at.q + K / gains["shaped_stiffness"] * stretch
+        at.theta
+        if isinstance(p.law, RigidImpedanceLaw)
+        else at.q + K / np.asarray(gains["shaped_stiffness"]) * stretch
     )
     home = posture(p.law.robot, shaped, model).pose
     tau_a = plant["joint_stiffness"] * stretch

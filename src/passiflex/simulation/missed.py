@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 from scipy.sparse.linalg import LinearOperator, gmres
 
 from passiflex.simulation.law_slope import Gains
-from passiflex.simulation.linear_loop import LinearLoop, Timing
+from passiflex.simulation.linear_loop import LinearLoop
 from passiflex.simulation.modes import HELD, Modes, coupled
+from passiflex.simulation.timing import Timing
 
 Array = NDArray[np.float64]
 

@@ -181,7 +181,8 @@ def _vector(matrix: Array, value: complex) -> NDArray[Any]:
 
 
 def _redundant(task_jacobian: Array) -> bool:
-    return bool(task_jacobian.shape[1] > np.linalg.matrix_rank(task_jacobian, tol=1e-6))
+    wishes, n = task_jacobian.shape
+    return wishes < n or bool(np.linalg.matrix_rank(task_jacobian, tol=1e-6) < n)
 
 
 class Coupled(NamedTuple):
@@ -193,14 +194,12 @@ class Coupled(NamedTuple):
 
 def coupled(matrix: Array) -> Coupled:
     """Return the coordinates that others read and write; one that none does has its own entry as eigenvalue."""
-    kept = np.arange(len(matrix))
-    alone: list[float] = []
-    own = np.diag(matrix)
+    linked = np.abs(matrix) >= ROUND_OFF
+    np.fill_diagonal(linked, False)
+    coupled = np.ones(len(matrix), dtype=bool)
     while True:
-        here = np.abs(matrix[np.ix_(kept, kept)])
-        np.fill_diagonal(here, 0.0)
-        single = (here.max(axis=0, initial=0) < ROUND_OFF) | (here.max(axis=1, initial=0) < ROUND_OFF)
+        single = coupled & ~(linked.any(axis=0) & linked.any(axis=1))
         if not single.any():
-            return Coupled(kept, np.array(alone))
-        alone += own[kept[single]].tolist()
-        kept = kept[~single]
+            return Coupled(np.flatnonzero(coupled), np.diag(matrix)[~coupled])
+        coupled &= ~single
+        linked[single], linked[:, single] = False, False

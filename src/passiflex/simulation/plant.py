@@ -49,7 +49,7 @@ class Plant:
 
     robot: FlexibleJointRobot
 
-    @property
+    @cached_property
     def parameters(self) -> Layout:
         """Return the robot's numbers and its friction."""
         return self.robot.layout + friction_layout(self.robot.n)

@@ -34,8 +34,10 @@ class Posture(NamedTuple):
 def posture(robot: FlexibleJointRobot, q: Array, parameters: dict[str, Array]) -> Posture:
     """Return pose, Jacobian, M and ∇V at q (n,) for the numbers of `robot.layout`."""
     numbers = robot.arm.layout.pack({f.name: parameters[f.name] for f in robot.arm.layout})
-    p, R, J, M, gravity = (np.array(v) for v in _posture_function(robot.arm)(q, numbers))
-    return Posture(Pose(p.ravel(), R), J, M, gravity.ravel())
+    flat = np.array(_posture_function(robot.arm)(q, numbers)).ravel()
+    n = robot.n
+    p, R, J, M, gravity = np.split(flat, np.cumsum([3, 9, 6 * n, n * n]))
+    return Posture(Pose(p, R.reshape(3, 3)), J.reshape(6, n), M.reshape(n, n), gravity)
 
 
 def held_jacobian(task: AbstractTask, at: Posture) -> Array:
@@ -70,4 +72,7 @@ def _posture_function(arm: SerialArm) -> cs.Function:
     q = cs.SX.sym("q", arm.n)
     vector, m = arm.layout.symbols("m")
     outputs = [*arm.pose(q, m), arm.jacobian(q, m), arm.mass_matrix(q, m), arm.gravity_torque(q, m)]
-    return cs.Function("posture", [q, vector], outputs, {"cse": True})
+    flat = cs.vertcat(
+        *(cs.vec(cs.densify(value).T) for value in outputs)
+    )  # one array is sooner read than five
+    return cs.Function("posture", [q, vector], [flat], {"cse": True})
