@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from passiflex.control.damping_design import damping_from_ratio
+from passiflex.control.damping_design import ElasticArm, damping_from_ratio, damping_of_elastic
+from passiflex.control.inner_loop import shaped_damping
 from passiflex.control.law import AbstractLaw
 from passiflex.control.tank import NO_CAP, EnergyTank
 from passiflex.control.task import AbstractTask
@@ -39,9 +40,7 @@ def law_gains(
         gains["damping"] = (
             s.damping.full()
             if s.damping.ratio is None
-            else _designed(
-                law.task, stiffness, start, gains["shaped_inertia"], s.regularisation, s.damping.ratio
-            )
+            else _designed(law.task, gains, start, model, s.damping.ratio)
         )
         return gains
     carried = model["motor_inertia"] if s.motor_inertia == "carried" else np.zeros(robot.n)
@@ -95,19 +94,30 @@ def sized(
 
 
 def _designed(
-    task: AbstractTask, stiffness: Array, start: Posture, motors: Array, regularisation: float, ratio: float
+    task: AbstractTask, gains: dict[str, Array], start: Posture, model: dict[str, Array], ratio: float
 ) -> Array:
     """Return the D_x (k, k) with which every mode of the directions that are held has a damping ratio.
 
     The inertia is that of all that moves, links and motors as the law shapes them: (J (M + B_e)⁻¹ Jᵀ + ε I)⁻¹.
     """
-    J = held_jacobian(task, start)
-    moving = start.mass_matrix + np.diag(motors)
-    inertia = np.linalg.inv(J @ np.linalg.solve(moving, J.T) + regularisation * np.eye(len(J)))
+    J, M, stiffness, motors = (
+        held_jacobian(task, start),
+        start.mass_matrix,
+        gains["stiffness"],
+        gains["shaped_inertia"],
+    )
+
+    def felt(moving: Array) -> Array:
+        mobility = J @ np.linalg.solve(moving, J.T) + gains["regularisation"] * np.eye(len(J))
+        return _symmetric(np.linalg.inv(mobility).astype(np.float64))
+
+    K, K_e = model["joint_stiffness"], gains["shaped_stiffness"]
+    still = gains["null_space_damping"] * (M - J.T @ felt(M) @ J)
+    arm = ElasticArm(M, still, motors, K_e, np.asarray(shaped_damping(K, model["joint_damping"], K_e)), J)
     axes = np.ix_(task.held, task.held)
     damping = np.zeros_like(stiffness)
     held = stiffness if task.turned else in_world(stiffness, start.pose.rotation)
-    damping[axes] = damping_from_ratio(held[axes], _symmetric(inertia.astype(np.float64)), ratio)
+    damping[axes] = damping_of_elastic(held[axes], felt(M + np.diag(motors)), ratio, arm)
     return damping
 
 
