@@ -63,6 +63,14 @@ def test_an_arm_without_self_motions_has_no_drift() -> None:
     assert Modes.radius_of(matrix, T, np.eye(3)) == pytest.approx(1.0)
 
 
+@pytest.mark.parametrize(("seen", "drifts"), [(3e-5, True), (0.05, False)])
+def test_next_to_a_stretched_elbow_there_is_a_self_motion(seen: float, drifts: bool) -> None:
+    """Joint 3 moves the task by a share of what joint 1 does: 1.5e-4 rad from the singularity that is 3e-5."""
+    matrix = turned([np.exp(0.002 * T), 0.9], [[0.0, 0.0, 1.0], [1.0, 0.5, 0.0]])
+    modes = Modes.of(matrix, T, np.diag([1.1, 0.7, seen]))
+    assert modes.dominant(3, np.ones(6)).stable is drifts
+
+
 def test_a_double_eigenvalue_is_drift_twice() -> None:
     """Where nothing damps: position and velocity of the self-motion, a Jordan block that round-off tears apart."""
     rng = np.random.default_rng(2)

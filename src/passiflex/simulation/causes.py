@@ -12,7 +12,7 @@ from passiflex.simulation.altered import with_flange
 from passiflex.simulation.clock_words import counted, delay_words, hertz
 from passiflex.simulation.judgement import Judgement
 from passiflex.simulation.linear_loop import LinearLoop
-from passiflex.simulation.modes import Modes
+from passiflex.simulation.modes import Modes, self_motions
 from passiflex.simulation.problem import Problem
 from passiflex.simulation.remedies import TOOL, Remedy, remedies
 from passiflex.simulation.trial import Change, Trial
@@ -136,7 +136,7 @@ def _is_self_motion(t: Trial) -> bool:
     case = t.cases[0]
     J = t.loop.task_jacobian
     modes = Modes.of(case.loop.matrix(None, t.found.delay, case.gains), t.loop.s.period, J)
-    if J.shape[1] <= np.linalg.matrix_rank(J, tol=1e-6):
+    if not self_motions(J):
         return False
     worst = int(np.argmax(np.where(modes.drifting, 0, np.abs(modes.values))))
     q = modes.vectors[: t.loop.n, worst]

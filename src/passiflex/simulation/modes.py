@@ -19,6 +19,8 @@ DRIFT_RATE = 1.0
 """[1/s] A self-motion that changes more slowly than this drifts; a faster one is a mode like any other."""
 DRIFT_SHARE = 0.1
 """Largest motion of the task, as a share of what the joints could make of it, in a self-motion."""
+UNSEEN = 1e-3
+"""Singular value of the task's Jacobian below which a motion is one of the arm in itself, as at a stretched elbow."""
 TREMBLING = 5.0
 """[Hz] A motion that is faster is no task's: it trembles."""
 SHIFT = 1e-9
@@ -73,8 +75,8 @@ class Modes:
     def of(cls, matrix: Array, period: float, task_jacobian: Array) -> Modes:
         """Return the modes of a map whose first coordinates are q."""
         values, vectors = np.linalg.eig(matrix)
-        free = task_jacobian.shape[1] - int(np.linalg.matrix_rank(task_jacobian, tol=1e-6))
-        return cls(values, vectors, self_motion(values, vectors, period, task_jacobian), period, free)
+        drifting = self_motion(values, vectors, period, task_jacobian)
+        return cls(values, vectors, drifting, period, self_motions(task_jacobian))
 
     @staticmethod
     def radius_of(matrix: Array, period: float, task_jacobian: Array) -> float:
@@ -151,7 +153,7 @@ def self_motion(values: NDArray[Any], vectors: NDArray[Any], period: float, task
     """Return which modes are self-motions that nothing holds: slow, not dying out, and without motion of the task.
 
     The end effector does not see them, so that no impedance can hold them. Where an arm has no self-motion there
-    is none.
+    is none; next to a singularity it has.
     """
     n = task_jacobian.shape[1]
     flags = np.zeros(values.size, dtype=bool)
@@ -182,7 +184,12 @@ def _vector(matrix: Array, value: complex) -> NDArray[Any]:
 
 def _redundant(task_jacobian: Array) -> bool:
     wishes, n = task_jacobian.shape
-    return wishes < n or bool(np.linalg.matrix_rank(task_jacobian, tol=1e-6) < n)
+    return wishes < n or self_motions(task_jacobian) > 0
+
+
+def self_motions(task_jacobian: Array) -> int:
+    """Return how many motions of the joints the task does not see."""
+    return task_jacobian.shape[1] - int(np.linalg.matrix_rank(task_jacobian, tol=UNSEEN))
 
 
 class Coupled(NamedTuple):
