@@ -12,6 +12,7 @@ MODULES = sorted(SOURCE.rglob("*.py"))
 FOUNDATION = ("errors", "layout", "files")
 ROOMS = (
     *FOUNDATION,
+    "texts",
     "robots",
     "phs",
     "control",

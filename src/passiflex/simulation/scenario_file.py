@@ -8,11 +8,12 @@ from typing import Any
 from pydantic import ValidationError
 
 from passiflex.errors import ScenarioError
-from passiflex.simulation.model_mistakes import explained
 from passiflex.simulation.scenario import Scenario
-from passiflex.simulation.yaml_tree import Place, RefusedText, Tree
+from passiflex.texts.model_mistakes import explained
+from passiflex.texts.yaml_tree import Place, RefusedText, Tree
 
 MAX_BYTES = 1_000_000
+A_SCENARIO = "a scenario needs at least name, robot, posture, law and duration"
 
 
 def load_scenario(path: str | Path) -> Scenario:
@@ -61,7 +62,7 @@ def parse_scenario(text: str, source: str = "scenario", base_dir: str | Path | N
     """
     tree = Tree()
     try:
-        data = tree.read(text)
+        data = tree.read(text, A_SCENARIO)
     except RefusedText as error:
         raise ScenarioError(source, [str(error)]) from None
     scenario = read_scenario(data, tree, (), base_dir)

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from passiflex.simulation.quantity import Quantity
+from passiflex.texts.quantity import Quantity
 
 
 @pytest.mark.parametrize(

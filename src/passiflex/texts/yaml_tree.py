@@ -8,11 +8,10 @@ from typing import Any, NamedTuple
 
 import yaml
 
-from passiflex.simulation.quantity import shown
+from passiflex.texts.quantity import shown
 
 MAX_NODES = 100_000
 MAX_DEPTH = 30
-A_SCENARIO = "a scenario needs at least name, robot, posture, law and duration"
 
 Place = tuple[str | int, ...]
 """Where a value is: the names and indices that lead to it."""
@@ -47,7 +46,7 @@ class Tree:
         self.values: dict[Place, Mark] = {}
         self.mistakes: list[tuple[Mark, str, str]] = []
 
-    def read(self, text: str, needs: str = A_SCENARIO) -> dict[str, Any]:
+    def read(self, text: str, needs: str) -> dict[str, Any]:
         """Return the mapping of the text; raise RefusedText where there is none, which says what one needs."""
         try:
             node = yaml.compose(text, yaml.BaseLoader)

@@ -1,4 +1,4 @@
-"""Numbers with units: what a person writes in a scenario file becomes plain SI numbers."""
+"""Numbers with units: what a person writes in a file becomes plain SI numbers."""
 
 from __future__ import annotations
 
