@@ -16,7 +16,8 @@ from passiflex.simulation.law_settings import ImpedanceSettings, RigidSettings
 from passiflex.simulation.model_errors import Deviations, ModelErrors
 from passiflex.simulation.noise_settings import Noise
 from passiflex.simulation.scenario import Circle, Hold, Move, Scenario, Step, TankSettings
-from passiflex.simulation.scenario_file import MAX_BYTES, load_scenario, parse_scenario
+from passiflex.simulation.scenario_file import load_scenario, parse_scenario
+from passiflex.texts.text_file import MAX_BYTES
 
 GOOD = """\
 name: fig1
@@ -471,7 +472,7 @@ def test_files_that_cannot_be_read(tmp_path):
         ("a" * 5000, "cannot be read: File name too long"),
         ("", "cannot be read: Is a directory"),
         ("latin.yaml", "cannot be read: not UTF-8 text"),
-        ("large.yaml", "the file is larger than 1 MB"),
+        ("large.yaml", "cannot be read: larger than 1 MB"),
     ]:
         with pytest.raises(ScenarioError) as error:
             load_scenario(tmp_path / name)

@@ -10,9 +10,9 @@ from pydantic import ValidationError
 from passiflex.errors import ScenarioError
 from passiflex.simulation.scenario import Scenario
 from passiflex.texts.model_mistakes import explained
+from passiflex.texts.text_file import IN_YAML, UnreadableError, decoded, read_bytes
 from passiflex.texts.yaml_tree import Place, RefusedText, Tree
 
-MAX_BYTES = 1_000_000
 A_SCENARIO = "a scenario needs at least name, robot, posture, law and duration"
 
 
@@ -39,17 +39,9 @@ def read_text(path: Path) -> str:
         If it cannot be read, is no text or larger than 1 MB.
     """
     try:
-        with path.open("rb") as file:
-            data = file.read(MAX_BYTES + 1)
-        text = data.decode("utf-8-sig") if len(data) <= MAX_BYTES else ""
-    except UnicodeDecodeError:
-        raise ScenarioError(str(path), ["cannot be read: not UTF-8 text"]) from None
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise ScenarioError(str(path), [f"cannot be read: {reason}"]) from None
-    if len(data) > MAX_BYTES:
-        raise ScenarioError(str(path), ["the file is larger than 1 MB"])
-    return text
+        return decoded(read_bytes(path), IN_YAML)
+    except UnreadableError as error:
+        raise ScenarioError(str(path), [f"cannot be read: {error}"]) from None
 
 
 def parse_scenario(text: str, source: str = "scenario", base_dir: str | Path | None = None) -> Scenario:

@@ -10,8 +10,11 @@ import yaml
 
 from passiflex.texts.quantity import shown
 
+MAX_CHARACTERS = 4_000_000
 MAX_NODES = 100_000
 MAX_DEPTH = 30
+MOST_LINES = 100
+TOO_MANY = f"more than {MAX_NODES} entries, aliases counted as often as they are used"
 
 Place = tuple[str | int, ...]
 """Where a value is: the names and indices that lead to it."""
@@ -38,18 +41,44 @@ class RefusedText(Exception):  # noqa: N818 - becomes a ScenarioError
     """The text is no tree of mappings, lists and scalars of bearable size."""
 
 
+class _Bounded(yaml.BaseLoader):
+    """The composer of PyYAML, which gives up early on a text that is too large or too deep for its reader."""
+
+    def __init__(self, text: str):
+        super().__init__(text)
+        self.nodes = self.depth = 0
+
+    def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
+        """Return the next node."""
+        self.nodes += 1
+        self.depth += 1
+        if self.nodes > 2 * MAX_NODES:  # keys are nodes, too
+            raise RefusedText(TOO_MANY)
+        if self.depth > 3 * MAX_DEPTH:
+            raise RefusedText("nested too deeply")
+        node = super().compose_node(parent, index)
+        self.depth -= 1
+        return node
+
+
 class Tree:
-    """A YAML text as Python values, with the mark of every key and value, and the mistakes found so far."""
+    """A YAML text as Python values, with the mark of every key and value, and the mistakes found so far.
+
+    `spans` says from which to which character of the text a value goes.
+    """
 
     def __init__(self) -> None:
         self.keys: dict[Place, Mark] = {}
         self.values: dict[Place, Mark] = {}
+        self.spans: dict[Place, slice] = {}
         self.mistakes: list[tuple[Mark, str, str]] = []
 
     def read(self, text: str, needs: str) -> dict[str, Any]:
         """Return the mapping of the text; raise RefusedText where there is none, which says what one needs."""
+        if len(text) > MAX_CHARACTERS:
+            raise RefusedText(f"longer than {MAX_CHARACTERS} characters")
         try:
-            node = yaml.compose(text, yaml.BaseLoader)
+            node = yaml.compose(text, _Bounded)
         except yaml.reader.ReaderError as error:
             before = text[: error.position]
             line, column = before.count("\n") + 1, len(before) - before.rfind("\n")
@@ -78,15 +107,18 @@ class Tree:
         self.mistakes.append((mark or Mark(1, 1), f", {dotted(place)}" if place else "", message))
 
     def lines(self) -> list[str]:
-        """Return the mistakes, one line each, in the order of the file."""
+        """Return the mistakes, one line each, in the order of the file; of very many the first ones."""
         found = [f"line {m.line}, column {m.column}{name}: {text}" for m, name, text in sorted(self.mistakes)]
-        return list(dict.fromkeys(found))
+        found = list(dict.fromkeys(found))
+        more = len(found) - MOST_LINES
+        return [*found[:MOST_LINES], f"and {more} more"] if more > 0 else found
 
     def _value(self, node: yaml.Node, place: Place) -> Any:
         mark = _mark(node)
         self.values[place] = mark
+        self.spans[place] = slice(node.start_mark.index, node.end_mark.index)
         if len(self.values) > MAX_NODES:
-            raise RefusedText(f"more than {MAX_NODES} entries, aliases counted as often as they are used")
+            raise RefusedText(TOO_MANY)
         if len(place) > MAX_DEPTH:
             raise RefusedText(f"line {mark.line}, column {mark.column}: nested too deeply")
         if node.tag not in _STANDARD_TAGS:
