@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, StringConstraints, ValidationError
 
 from passiflex.errors import NameUnknownError, RobotError
-from passiflex.robots.chain import SerialChain
+from passiflex.robots.chain import SerialChain, read_chain
 
 Array = NDArray[np.float64]
 Text = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1)]
@@ -153,7 +153,7 @@ def _read(path: Path) -> RobotDescription:
         needs = "a path, absolute or from the folder of this file"
         raise RobotError(f"{path}: entry urdf: no such file", got=repr(str(urdf)), needs=needs)
     links = _held(urdf)
-    chain = SerialChain.from_urdf(urdf, file.end_effector)
+    chain = read_chain(urdf, file.end_effector).chain
     values = {entry: _in_si(path, entry, getattr(file, entry), chain) for entry in UNITS}
     parts = (*chain.joints, *chain.bodies, (chain.tip_xyz, chain.tip_rotation), values.values())
     for array in (a for part in parts for a in part if isinstance(a, np.ndarray)):

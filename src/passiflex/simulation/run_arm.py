@@ -12,7 +12,7 @@ from pydantic import ValidationError
 
 from passiflex.errors import PassiflexError
 from passiflex.robots.catalogue import read_description
-from passiflex.robots.chain import SerialChain
+from passiflex.robots.chain import SerialChain, read_chain
 from passiflex.robots.frames import world_frames
 from passiflex.simulation.run import Run
 from passiflex.simulation.scenario import Tool
@@ -39,7 +39,7 @@ def _candidates(run: Run) -> Iterator[SerialChain]:
     name, text = str(run.data.attrs.get("robot", "")), str(run.data.attrs.get("robot_description", ""))
     if "<" in text:  # anything else would be read as the path of a file
         with suppress(PassiflexError):  # a damaged description: the catalogue may know the robot
-            yield replace(SerialChain.from_urdf(text), name=name or "arm")
+            yield replace(read_chain(text).chain, name=name or "arm")
     settings = _settings(run)
     if settings is not None:
         robot, tool = settings
