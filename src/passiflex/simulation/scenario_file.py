@@ -8,6 +8,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from passiflex.errors import ScenarioError
+from passiflex.robots.catalogue import is_path
 from passiflex.simulation.scenario import Scenario
 from passiflex.texts.model_mistakes import explained
 from passiflex.texts.text_file import IN_YAML, UnreadableError, decoded, read_bytes
@@ -68,7 +69,7 @@ def read_scenario(
 ) -> Scenario | None:
     """Return the scenario written at a place of the tree; None if it has mistakes, which the tree then has too."""
     robot = data.get("robot")
-    if base_dir is not None and isinstance(robot, str) and _is_path(robot):
+    if base_dir is not None and isinstance(robot, str) and is_path(robot):
         data["robot"] = str(Path(base_dir) / robot)
     try:
         return Scenario.model_validate(data)
@@ -76,8 +77,3 @@ def read_scenario(
         for below, message, at_key in explained(error, data, Scenario):
             tree.report((*place, *below), message, at_key=at_key)
     return None
-
-
-def _is_path(robot: str) -> bool:
-    """Return whether a robot is named by its file, as the catalogue decides it."""
-    return Path(robot).suffix in (".yaml", ".yml") or len(Path(robot).parts) > 1
