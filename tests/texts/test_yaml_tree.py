@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from passiflex.texts import yaml_tree
-from passiflex.texts.yaml_tree import MOST_LINES, RefusedText, Tree
+from passiflex.texts.yaml_tree import MOST_LINES, RefusedText, Tree, read_back
 
 VALUES = st.recursive(
     st.none()
@@ -23,7 +23,7 @@ VALUES = st.recursive(
 
 @given(st.dictionaries(st.text(min_size=1, max_size=8), VALUES, min_size=1, max_size=5))
 def test_what_pyyaml_writes_is_read_back(data: dict) -> None:
-    assert Tree().read(yaml.safe_dump(data), "") == data
+    assert Tree().read(yaml.safe_dump(data), "") == read_back(yaml.safe_dump(data)) == data
 
 
 @pytest.mark.parametrize(

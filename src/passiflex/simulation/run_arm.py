@@ -7,7 +7,6 @@ from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
-import yaml
 from pydantic import ValidationError
 
 from passiflex.errors import PassiflexError
@@ -16,6 +15,7 @@ from passiflex.robots.chain import SerialChain, read_chain
 from passiflex.robots.frames import world_frames
 from passiflex.simulation.run import Run
 from passiflex.simulation.scenario import Tool
+from passiflex.texts.yaml_tree import RefusedText, Tree
 
 NEAR = 1e-6
 """Share of the arm's reach by which its end effector may be off the recorded one."""
@@ -53,9 +53,11 @@ def _candidates(run: Run) -> Iterator[SerialChain]:
 def _settings(run: Run) -> tuple[str, Tool] | None:
     """Return robot and tool of the run's configuration, None where that cannot be read."""
     try:
-        configuration = yaml.safe_load(str(run.data.attrs.get("configuration", "")))
+        configuration = Tree().read(
+            str(run.data.attrs.get("configuration", "")), "a configuration names a robot"
+        )
         return str(configuration["robot"]), Tool.model_validate(configuration.get("tool", {}))
-    except (yaml.YAMLError, ValidationError, AttributeError, KeyError, TypeError):
+    except (RefusedText, ValidationError, KeyError):
         return None
 
 
