@@ -19,12 +19,9 @@ from passiflex.robots.doubts import doubts
 from passiflex.robots.robot_file import UNITS, RobotFile, a_urdf, unreadable
 from passiflex.robots.urdf_xml import MOST_BYTES
 from passiflex.texts.quantity import shown
-from passiflex.texts.text_file import UnreadableError, read_bytes
+from passiflex.texts.text_file import URDFS, UnreadableError, is_path, read_bytes
 
 Array = NDArray[np.float64]
-
-YAMLS = (".yaml", ".yml")
-URDFS = (".urdf", ".xacro", ".xml", ".sdf")
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,12 +61,6 @@ def catalogue() -> tuple[str, ...]:
     """Return the names of the robots that come with the package."""
     data = resources.files(__package__) / "data"
     return tuple(sorted(f.name.removesuffix(".yaml") for f in data.iterdir() if f.name.endswith(".yaml")))
-
-
-def is_path(name: str | Path) -> bool:
-    """Return whether a robot is named by its file: by a path, or by what ends as such files do."""
-    path = Path(name)
-    return isinstance(name, Path) or path.suffix.lower() in (*YAMLS, *URDFS) or len(path.parts) > 1
 
 
 def read_description(name_or_path: str | Path) -> RobotDescription:

@@ -8,10 +8,9 @@ from typing import Any
 from pydantic import ValidationError
 
 from passiflex.errors import ScenarioError
-from passiflex.robots.catalogue import is_path
 from passiflex.simulation.scenario import Scenario
 from passiflex.texts.model_mistakes import explained
-from passiflex.texts.text_file import IN_YAML, UnreadableError, decoded, read_bytes
+from passiflex.texts.text_file import IN_YAML, UnreadableError, decoded, is_path, read_bytes
 from passiflex.texts.yaml_tree import Place, RefusedText, Tree
 
 A_SCENARIO = "a scenario needs at least name, robot, posture, law and duration"

@@ -15,6 +15,10 @@ IN_YAML = re.compile(rb"#[^\n]{0,200}?-\*-[^\n]{0,200}?coding:\s*([\w.-]{1,40})[
 IN_XML = re.compile(rb"\s*<\?xml[^>]{0,200}?\sencoding\s*=\s*[\"']([A-Za-z][\w.-]{0,40})[\"']")
 """Where the first bytes of a document name its encoding."""
 
+YAMLS = (".yaml", ".yml")
+URDFS = (".urdf", ".xacro", ".xml", ".sdf")
+"""How the files of robots end."""
+
 _MARKS = (
     (codecs.BOM_UTF8, "utf-8"),
     (codecs.BOM_UTF32_LE, "utf-32"),
@@ -35,6 +39,12 @@ _ASCII = bytes(range(0x20, 0x7F))
 
 class UnreadableError(Exception):
     """There is no text to be had; the message says why, and whoever reads says of what."""
+
+
+def is_path(name: str | Path) -> bool:
+    """Return whether a robot is named by its file: by a path, or by what ends as such files do."""
+    path = Path(name)
+    return isinstance(name, Path) or path.suffix.lower() in (*YAMLS, *URDFS) or len(path.parts) > 1
 
 
 def read_bytes(path: Path, most: int = MAX_BYTES) -> bytes:
