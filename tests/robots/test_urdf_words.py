@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from passiflex.errors import RobotError
+from passiflex.errors import NameUnknownError, RobotError
 from passiflex.robots.chain import SerialChain
 
 ARM = """<robot name="arm">
@@ -176,6 +176,15 @@ def test_the_work_grows_as_the_number_of_links() -> None:
 
     few = min(taken(1500) for _ in range(2))
     assert taken(6000) < 10 * few
+
+
+def test_of_very_many_names_the_first_are_listed() -> None:
+    links = "".join(f'<link name="l{i}"/><joint name="j{i}" type="fixed"><parent link="leg"/><child link="l{i}"/></joint>'
+                    for i in range(1000))  # fmt: skip
+    with pytest.raises(NameUnknownError) as error:
+        SerialChain.from_urdf(with_("</robot>", links + "</robot>"), "l1001")
+    assert ", ...; try 'l" in str(error.value)
+    assert len(str(error.value)) < 1000
 
 
 def test_a_chain_of_very_many_moving_joints_is_refused() -> None:

@@ -10,6 +10,7 @@ from pydantic import ValidationError
 from passiflex.errors import ScenarioError
 from passiflex.simulation.scenario import Scenario
 from passiflex.texts.model_mistakes import explained
+from passiflex.texts.quantity import shown
 from passiflex.texts.text_file import IN_YAML, UnreadableError, decoded, is_path, read_bytes
 from passiflex.texts.yaml_tree import Place, RefusedText, Tree
 
@@ -26,6 +27,10 @@ def load_scenario(path: str | Path) -> Scenario:
     ScenarioError
         With one line for each mistake, or one line if the file cannot be read.
     """
+    if not isinstance(path, str | Path) or not str(path).strip():
+        raise ScenarioError(
+            shown(path), ["no scenario; try the path of its file, or parse_scenario for a text"]
+        )
     path = Path(path)
     return parse_scenario(read_text(path), str(path), path.resolve().parent)
 

@@ -26,6 +26,7 @@ _WORDS = {
     **dict.fromkeys(("false", "False", "FALSE"), False),
     **dict.fromkeys(("", "~", "null", "Null", "NULL")),
 }
+_XML = re.compile(r"\s*<[?!A-Za-z]")
 _SURROGATE = re.compile("[\ud800-\udfff]")
 _STANDARD_TAGS = {f"tag:yaml.org,2002:{kind}" for kind in ("str", "seq", "map")}
 
@@ -79,29 +80,12 @@ class Tree:
 
     def read(self, text: str, needs: str) -> dict[str, Any]:
         """Return the mapping of the text; raise RefusedText where there is none, which says what one needs."""
-        if len(text) > MAX_CHARACTERS:
-            raise RefusedText(f"longer than {MAX_CHARACTERS} characters")
         try:
-            node = yaml.compose(text, _Bounded)
-        except yaml.reader.ReaderError as error:
-            before = text[: error.position]
-            line, column = before.count("\n") + 1, len(before) - before.rfind("\n")
-            raise RefusedText(f"line {line}, column {column}: a character that YAML does not allow") from None
-        except yaml.MarkedYAMLError as error:
-            problem = error.problem_mark or error.context_mark
-            at = f"line {problem.line + 1}, column {problem.column + 1}: " if problem else ""
-            what = ", ".join(p for p in (error.context, error.problem) if p)
-            raise RefusedText(f"{at}no YAML: {_one_line(what)}") from None
-        except RecursionError:
-            raise RefusedText("nested too deeply") from None
-        except (yaml.YAMLError, ValueError, OverflowError) as error:
-            raise RefusedText(f"no YAML: {_one_line(str(error))}") from None
-        if node is None:
-            raise RefusedText(f"empty; {needs}")
-        if not isinstance(node, yaml.MappingNode):
-            mark = _mark(node)
-            raise RefusedText(f"line {mark.line}, column {mark.column}: not a mapping; try 'name: ...'")
-        mapping: dict[str, Any] = self._value(node, ())
+            mapping: dict[str, Any] = self._value(_composed(text, needs), ())
+        except RefusedText:
+            if _XML.match(text):
+                raise RefusedText(f"XML in place of YAML, as of a URDF; {needs}") from None
+            raise
         return mapping
 
     def report(self, place: Place, message: str, *, at_key: bool = False, mark: Mark | None = None) -> None:
@@ -151,6 +135,33 @@ class Tree:
             self.keys[here] = _mark(key)
             out[key.value] = self._value(child, here)
         return out
+
+
+def _composed(text: str, needs: str) -> yaml.MappingNode:
+    """Return the mapping that a text of bearable size is composed to."""
+    if len(text) > MAX_CHARACTERS:
+        raise RefusedText(f"longer than {MAX_CHARACTERS} characters")
+    try:
+        node = yaml.compose(text, _Bounded)
+    except yaml.reader.ReaderError as error:
+        before = text[: error.position]
+        line, column = before.count("\n") + 1, len(before) - before.rfind("\n")
+        raise RefusedText(f"line {line}, column {column}: a character that YAML does not allow") from None
+    except yaml.MarkedYAMLError as error:
+        problem = error.problem_mark or error.context_mark
+        at = f"line {problem.line + 1}, column {problem.column + 1}: " if problem else ""
+        what = ", ".join(p for p in (error.context, error.problem) if p)
+        raise RefusedText(f"{at}no YAML: {_one_line(what)}") from None
+    except RecursionError:
+        raise RefusedText("nested too deeply") from None
+    except (yaml.YAMLError, ValueError, OverflowError) as error:
+        raise RefusedText(f"no YAML: {_one_line(str(error))}") from None
+    if node is None:
+        raise RefusedText(f"empty; {needs}")
+    if not isinstance(node, yaml.MappingNode):
+        mark = _mark(node)
+        raise RefusedText(f"line {mark.line}, column {mark.column}: not a mapping; try 'name: ...'")
+    return node
 
 
 def read_back(text: str) -> dict[str, Any]:
