@@ -165,6 +165,29 @@ def test_a_relative_import_of_a_room_itself_starts_at_the_room() -> None:
     ]
 
 
+def test_yaml_is_read_in_one_place() -> None:
+    readers = {
+        "load",
+        "safe_load",
+        "full_load",
+        "unsafe_load",
+        "load_all",
+        "safe_load_all",
+        "compose",
+        "parse",
+        "scan",
+    }
+    found = {
+        dotted_name(path)
+        for path in MODULES
+        for node in ast.walk(ast.parse(path.read_text()))
+        if isinstance(node, ast.Attribute)
+        and node.attr in readers
+        and getattr(node.value, "id", "") == "yaml"
+    }
+    assert found == {"passiflex.texts.yaml_tree"}
+
+
 @pytest.mark.parametrize("path", MODULES, ids=dotted_name)
 def test_a_module_is_short(path: Path) -> None:
     assert len(path.read_text().splitlines()) <= LONGEST

@@ -231,13 +231,13 @@ def test_files_that_are_no_robot_files(tmp_path):
     path.write_text("name: x\nvalue: [1, 2\n")
     with pytest.raises(
         RobotError,
-        match=r"bad.yaml is not a robot file; got line 3, column 1: no YAML: .*expected.*; needs YAML",
+        match=r"bad.yaml is not a robot file; got line 3, column 1: no YAML: .*expected.*; needs YAML with name,",
     ):
         read_description(path)
     path.write_text("- 1\n- 2\n")
     with pytest.raises(
         RobotError,
-        match=r"bad.yaml is not a robot file; got line 1, column 1: not a mapping.*; needs YAML",
+        match=r"bad.yaml is not a robot file; got line 1, column 1: not a mapping.*; needs YAML with name,",
     ):
         read_description(path)
 

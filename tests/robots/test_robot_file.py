@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import os
+import sys
 import warnings
 from pathlib import Path
 
@@ -230,6 +231,13 @@ def test_numbers_that_can_hardly_be_meant_are_said_once(
     if message is not None:
         with pytest.raises(PassiflexWarning, match=f"two.yaml: {message}"):
             raise said[0].message
+
+
+def test_workers_of_a_process_leave_it_to_say_so(write, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(
+        sys.modules["passiflex.robots.catalogue"], "parent_process", lambda: "the one that has said it"
+    )
+    FlexibleJointRobot.load(write("8000", "8"))  # a warning is an error in these tests
 
 
 def test_what_a_urdf_can_hardly_mean_is_said_when_a_robot_is_loaded_or_simulated(

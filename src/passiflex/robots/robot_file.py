@@ -107,16 +107,17 @@ class RobotFile:
 
     def __init__(self, path: Path, data: bytes):
         self.path, self._tree = path, Tree()
-        needs = f"a robot file has {', '.join(Entries.model_fields)}"
         try:
             text = decoded(data, IN_YAML)
             if text.lstrip().startswith("<"):
                 raise a_urdf(str(path))
-            content = self._tree.read(text, needs)
+            content = self._tree.read(text, "a robot file has its entries")
         except UnreadableError as error:
             raise unreadable(path, error) from None
         except RefusedText as error:
-            raise RobotError(f"{path} is not a robot file", got=error, needs=f"YAML; {needs}") from None
+            raise RobotError(
+                f"{path} is not a robot file", got=error, needs=f"YAML with {', '.join(Entries.model_fields)}"
+            ) from None
         try:
             self.entries = Entries.model_validate(content)
         except ValidationError as error:
