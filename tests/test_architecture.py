@@ -12,6 +12,7 @@ MODULES = sorted(SOURCE.rglob("*.py"))
 FOUNDATION = ("errors", "layout", "files")
 ROOMS = (
     *FOUNDATION,
+    "texts",
     "robots",
     "phs",
     "control",
@@ -162,6 +163,29 @@ def test_a_relative_import_of_a_room_itself_starts_at_the_room() -> None:
     assert violations("from .arm import Arm\nfrom ..phs import system", "passiflex.robots", package=True) == [
         "passiflex.robots, line 2: robots must not import phs"
     ]
+
+
+def test_yaml_is_read_in_one_place() -> None:
+    readers = {
+        "load",
+        "safe_load",
+        "full_load",
+        "unsafe_load",
+        "load_all",
+        "safe_load_all",
+        "compose",
+        "parse",
+        "scan",
+    }
+    found = {
+        dotted_name(path)
+        for path in MODULES
+        for node in ast.walk(ast.parse(path.read_text()))
+        if isinstance(node, ast.Attribute)
+        and node.attr in readers
+        and getattr(node.value, "id", "") == "yaml"
+    }
+    assert found == {"passiflex.texts.yaml_tree"}
 
 
 @pytest.mark.parametrize("path", MODULES, ids=dotted_name)

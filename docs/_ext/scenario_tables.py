@@ -19,9 +19,9 @@ from sphinx.util.docutils import SphinxDirective
 
 from passiflex.control.tank import EnergyTank
 from passiflex.sampled.tanks import TANKS
-from passiflex.simulation.quantity import Quantity
 from passiflex.simulation.scenario import Scenario
 from passiflex.simulation.tank_settings import TankSettings
+from passiflex.texts.quantity import Quantity
 
 COLUMNS = (("key", 22), ("write", 30), ("default", 12), ("meaning", 36))
 

@@ -42,7 +42,9 @@ class ValueRangeError(PassiflexError):
 
 
 class NameUnknownError(PassiflexError):
-    """A name is not known; the message lists the nearest ones."""
+    """A name is not known; the message lists the nearest ones, and of very many known ones the first."""
+
+    MOST_LISTED = 50
 
     def __init__(self, kind: str, got: str, known: Iterable[str]):
         names = sorted(known)
@@ -50,7 +52,7 @@ class NameUnknownError(PassiflexError):
         super().__init__(
             f"unknown {kind}",
             got=repr(got),
-            needs=f"one of {', '.join(names)}",
+            needs=f"one of {', '.join(names[: self.MOST_LISTED])}{', ...' * (len(names) > self.MOST_LISTED)}",
             try_=" or ".join(repr(n) for n in near) if near else None,
         )
 

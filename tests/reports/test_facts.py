@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from typing import Any
 
 import numpy as np
@@ -165,3 +166,14 @@ def test_a_configuration_without_a_robot_file_is_shown_as_it_is(text: str) -> No
 def test_of_a_configuration_that_is_no_yaml_no_path_is_shown() -> None:
     text = shown_configuration(changed(sampled(), configuration="robot: '/home/me/arm.yaml\nlaw: [1"))
     assert text == "robot: 'arm.yaml\nlaw: [1"
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["a" * 1_000_000, "robot: [" * 5000, "robot: 2001-99-99\n", "robot: " + "9" * 5000, "a: b" * 300_000],
+)
+def test_a_configuration_of_any_kind_is_shown_without_being_waited_for(text: str) -> None:
+    """Some took a time that grew as the square of their length; the bound is for a busy machine."""
+    started = time.process_time()
+    assert shown_configuration(changed(sampled(), configuration=text)) == text
+    assert time.process_time() - started < 10

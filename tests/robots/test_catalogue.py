@@ -156,8 +156,8 @@ WRONG = {
         "needs one of N/m, kN/m, N/mm$",
     ),
     "unknown unit": (
-        ("velocity_limit", {"unit": ["m/s", "rpm"]}),
-        "entry velocity_limit.unit does not fit revolute joint 2; got 'rpm'; needs one of rad/s, deg/s",
+        ("velocity_limit", {"unit": ["m/s", "knot"]}),
+        "entry velocity_limit.unit does not fit revolute joint 2; got 'knot'; needs one of rad/s, deg/s",
     ),
     "units": (
         ("motor_inertia", {"unit": ["kg"]}),
@@ -194,16 +194,19 @@ WRONG = {
     ),
     "no source": (
         ("torque_limit", {"source": " "}),
-        "has wrong entries; got entry torque_limit.source: .*at least 1 character",
+        r"has wrong entries; got line \d+, column 11, torque_limit.source: string should have at least 1 character",
     ),
-    "words": (("torque_limit", {"value": "strong"}), "has wrong entries; got entry torque_limit.value: "),
+    "words": (
+        ("torque_limit", {"value": "strong", "unit": ["N", "N m"]}),
+        r"entry torque_limit.value is wrong at joint 1: .*\(not a number with a unit\)",
+    ),
     "extra": (
         (None, {"colour": "red"}),
-        "has wrong entries; got entry colour: Extra inputs are not permitted",
+        r"has wrong entries; got line 1, column 1, colour: unknown name; try 'source'",
     ),
     "missing": (
         (None, {"motor_inertia": None}),
-        "has wrong entries; got entry motor_inertia: Field required",
+        r"has wrong entries; got line 1, column 1, motor_inertia: missing: B as seen at the link, with value, unit",
     ),
     "urdf": (
         (None, {"urdf": "none.urdf"}),
@@ -215,7 +218,7 @@ WRONG = {
 @pytest.mark.parametrize(("change", "message"), WRONG.values(), ids=WRONG)
 def test_wrong_entries_name_the_file_and_the_entry(write, change, message):
     entry, changes = change
-    with pytest.raises(RobotError, match=r"slider\.yaml:? " + message):
+    with pytest.raises(RobotError, match=r"slider\.yaml(, line \d+, column \d+)?:? " + message):
         read_description(write(entry, **changes))
 
 
@@ -227,12 +230,14 @@ def test_files_that_are_no_robot_files(tmp_path):
         read_description(path)
     path.write_text("name: x\nvalue: [1, 2\n")
     with pytest.raises(
-        RobotError, match=r"bad.yaml is not well-formed YAML, line 3; got expected.*; needs a YAML file"
+        RobotError,
+        match=r"bad.yaml is not a robot file; got line 3, column 1: no YAML: .*expected.*; needs YAML with name,",
     ):
         read_description(path)
     path.write_text("- 1\n- 2\n")
     with pytest.raises(
-        RobotError, match=r"bad.yaml is not a robot file; got list; needs the entries name, description, urdf"
+        RobotError,
+        match=r"bad.yaml is not a robot file; got line 1, column 1: not a mapping.*; needs YAML with name,",
     ):
         read_description(path)
 

@@ -14,9 +14,10 @@ from hypothesis import strategies as st
 from arms import serial_chains
 from passiflex.robots import SerialChain, catalogue
 from passiflex.robots.catalogue import read_description
+from passiflex.robots.chain import read_chain
 from passiflex.robots.frames import world_frames
 from passiflex.robots.solids import Solid, solids, with_solids
-from passiflex.robots.urdf import UNLIMITED
+from passiflex.robots.urdf_parts import UNLIMITED
 
 SEEDS = st.integers(0, 2**32 - 1)
 CLOSE = 1e-9
@@ -162,10 +163,7 @@ def test_a_link_with_an_offset_leaves_along_its_own_axis_and_arrives_along_the_n
 @pytest.mark.parametrize("name", catalogue())
 def test_the_urdf_with_solids_is_the_same_chain(name: str) -> None:
     chain = read_description(name).chain
-    assert (
-        SerialChain.from_urdf(with_solids(chain)).to_urdf()
-        == SerialChain.from_urdf(chain.to_urdf()).to_urdf()
-    )
+    assert read_chain(with_solids(chain)).chain.to_urdf() == read_chain(chain.to_urdf()).chain.to_urdf()
 
 
 @settings(max_examples=30, deadline=None)

@@ -31,7 +31,7 @@ def changed(**attributes: str | None) -> Run:
     return Run(data)
 
 
-@pytest.mark.parametrize("description", ["own", None, "<robot", "no URDF"])
+@pytest.mark.parametrize("description", ["own", None, "<robot", "no URDF", "<robot>" + "<!--" * 100_000])
 def test_the_arm_puts_the_end_effector_where_it_was_recorded(description: str | None) -> None:
     run = simulated() if description == "own" else changed(robot_description=description)
     chain = chain_of(run)
@@ -63,6 +63,15 @@ def test_a_description_of_another_arm_is_not_believed() -> None:
         {"configuration": "tool: {position: here}"},
         {"configuration": "{"},
         {"configuration": "a text"},
+        {"configuration": "robot: /dev/zero"},
+        {"configuration": 'robot: "/a\\0b.yaml"'},
+        {"configuration": "[" * 5000},
+        {"configuration": "robot: 2001-99-99"},
+        {"configuration": "robot: " + "9" * 5000},
+        {
+            "configuration": "a: &a [1]\n"
+            + "".join(f"b{i}: &b{i} [{', '.join([f'*b{i - 1}' if i else '*a'] * 9)}]\n" for i in range(9))
+        },
     ],
 )
 def test_a_run_that_does_not_say_what_it_was_has_no_arm(attributes: dict[str, str | None]) -> None:

@@ -16,7 +16,8 @@ from passiflex.simulation.law_settings import ImpedanceSettings, RigidSettings
 from passiflex.simulation.model_errors import Deviations, ModelErrors
 from passiflex.simulation.noise_settings import Noise
 from passiflex.simulation.scenario import Circle, Hold, Move, Scenario, Step, TankSettings
-from passiflex.simulation.scenario_file import MAX_BYTES, load_scenario, parse_scenario
+from passiflex.simulation.scenario_file import load_scenario, parse_scenario
+from passiflex.texts.text_file import MAX_BYTES
 
 GOOD = """\
 name: fig1
@@ -440,6 +441,10 @@ def test_all_mistakes_at_once_in_the_order_of_the_file():
         ("# only a comment", "empty; a scenario needs at least name, robot, posture, law and duration"),
         ("- a", "line 1, column 1: not a mapping; try 'name: ...'"),
         ("hello", "line 1, column 1: not a mapping; try 'name: ...'"),
+        (
+            "\n<?xml version='1.0'?>\n<robot/>",
+            "XML in place of YAML, as of a URDF; a scenario needs at least name, robot, posture, law and duration",
+        ),
         ("a: b: c", "line 1, column 5: no YAML: mapping values are not allowed here"),
         (
             "\n  a: [1\n",
@@ -471,12 +476,26 @@ def test_files_that_cannot_be_read(tmp_path):
         ("a" * 5000, "cannot be read: File name too long"),
         ("", "cannot be read: Is a directory"),
         ("latin.yaml", "cannot be read: not UTF-8 text"),
-        ("large.yaml", "the file is larger than 1 MB"),
+        ("large.yaml", "cannot be read: larger than 1 MB"),
     ]:
         with pytest.raises(ScenarioError) as error:
             load_scenario(tmp_path / name)
         assert error.value.mistakes == [line]
         assert str(error.value).startswith(str(tmp_path / name))
+
+
+@pytest.mark.parametrize("path", [None, "", " ", b"scenario.yaml", 3, {}])
+def test_what_is_no_path_is_an_error_of_the_package(path):
+    with pytest.raises(
+        ScenarioError, match="no scenario; try the path of its file, or parse_scenario for a text"
+    ):
+        load_scenario(path)
+
+
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "utf-16-be"])
+def test_a_file_is_read_in_the_encoding_that_it_says(tmp_path, encoding):
+    (tmp_path / "s.yaml").write_text(GOOD + "description: größer\n", encoding=encoding)
+    assert load_scenario(tmp_path / "s.yaml").description == "größer"
 
 
 YAMLISH = st.recursive(

@@ -13,9 +13,9 @@ from passiflex.campaigns.measures import MEASURES
 from passiflex.campaigns.parameters import checked
 from passiflex.campaigns.target import Target, complete_data, locate
 from passiflex.simulation.control_settings import Seconds
-from passiflex.simulation.model_mistakes import word
 from passiflex.simulation.scenario import Scenario
-from passiflex.simulation.section import Mistakes, Section
+from passiflex.texts.model_mistakes import word
+from passiflex.texts.section import Mistakes, Section
 
 MOST_SAMPLES = 1_000_000
 

@@ -9,11 +9,11 @@ from pydantic import ValidationError
 
 from passiflex.campaigns.campaign import Campaign
 from passiflex.errors import ScenarioError
-from passiflex.simulation.model_mistakes import explained
-from passiflex.simulation.quantity import shown
 from passiflex.simulation.scenario import Scenario
 from passiflex.simulation.scenario_file import load_scenario, read_scenario, read_text
-from passiflex.simulation.yaml_tree import RefusedText, Tree
+from passiflex.texts.model_mistakes import explained
+from passiflex.texts.quantity import shown
+from passiflex.texts.yaml_tree import RefusedText, Tree
 
 A_CAMPAIGN = "a campaign needs at least name, scenario and samples"
 

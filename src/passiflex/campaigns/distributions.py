@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import BeforeValidator, Field, model_validator
 from scipy.special import ndtr, ndtri
 
-from passiflex.simulation.quantity import Quantity, shown
-from passiflex.simulation.section import Mistakes, Section
+from passiflex.texts.quantity import Quantity, shown
+from passiflex.texts.section import Mistakes, Section
 
 Array = NDArray[np.float64]
 Value = float | str | bool

@@ -9,9 +9,9 @@ from pydantic import ValidationError
 
 from passiflex.campaigns.distributions import AbstractDistribution, Value
 from passiflex.campaigns.target import Target
-from passiflex.simulation.model_mistakes import explained
 from passiflex.simulation.scenario import Scenario
-from passiflex.simulation.yaml_tree import Place, dotted
+from passiflex.texts.model_mistakes import explained
+from passiflex.texts.yaml_tree import Place, dotted
 
 Parameters = Mapping[str, AbstractDistribution]
 Targets = Mapping[str, Target]

@@ -12,10 +12,10 @@ from pydantic_core import InitErrorDetails, PydanticCustomError
 from passiflex.campaigns.distributions import AbstractDistribution, Choice, Refused
 from passiflex.campaigns.ends import impossible
 from passiflex.campaigns.target import PathRefusedError, Target, locate
-from passiflex.simulation.model_mistakes import REFUSED_NAME, word
-from passiflex.simulation.quantity import Quantity, shown
-from passiflex.simulation.section import Mistakes
-from passiflex.simulation.yaml_tree import Place
+from passiflex.texts.model_mistakes import REFUSED_NAME, word
+from passiflex.texts.quantity import Quantity, shown
+from passiflex.texts.section import Mistakes
+from passiflex.texts.yaml_tree import Place
 
 Parameters = dict[str, AbstractDistribution]
 Targets = dict[str, Target]

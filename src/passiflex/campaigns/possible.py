@@ -8,7 +8,7 @@ from passiflex.errors import PassiflexError, ScenarioError
 from passiflex.robots.flexible import FlexibleJointRobot
 from passiflex.simulation.resolve import resolve
 from passiflex.simulation.scenario import Scenario
-from passiflex.simulation.yaml_tree import dotted
+from passiflex.texts.yaml_tree import dotted
 
 
 def require_possible(campaign: Campaign) -> None:

@@ -34,6 +34,7 @@ from passiflex.pieces.stored_rows import read_blocks, read_rows
 from passiflex.simulation import resolve
 from passiflex.simulation.admissible import require_stable
 from passiflex.simulation.batch import lane_loop
+from passiflex.texts.yaml_tree import read_back
 
 RUNS = "runs"
 """Folder of the worst samples' full runs, within that of the results."""
@@ -187,7 +188,7 @@ def _ready(campaign: Campaign) -> str:
 
 def _identity(campaign: Campaign) -> str:
     """Return the text of what rows depend on: all but how many there are, and of which a full run is kept."""
-    data = yaml.safe_load(campaign.to_yaml())
+    data = read_back(campaign.to_yaml())
     for name in ("samples", "description"):
         data.pop(name, None)
     for name in ("worst", "by"):

@@ -14,9 +14,9 @@ from passiflex.campaigns.distributions import Value
 from passiflex.campaigns.draws import columns, draws, scenario_seed
 from passiflex.campaigns.target import PathRefusedError, Target, complete_data, locate
 from passiflex.errors import ScenarioError, SizeError
-from passiflex.simulation.model_mistakes import explained
 from passiflex.simulation.scenario import Scenario
-from passiflex.simulation.yaml_tree import dotted
+from passiflex.texts.model_mistakes import explained
+from passiflex.texts.yaml_tree import dotted
 
 Values = dict[str, Value | tuple[Value, ...]]
 """What each parameter is: a number, word or flag; or one per joint."""

@@ -10,9 +10,9 @@ from typing import Any, Literal
 
 from pydantic.fields import FieldInfo
 
-from passiflex.simulation.model_mistakes import Model, fields, models, suggested, tag_field
-from passiflex.simulation.quantity import Quantity
 from passiflex.simulation.scenario import Scenario
+from passiflex.texts.model_mistakes import Model, fields, models, suggested, tag_field
+from passiflex.texts.quantity import Quantity
 
 _INDEX = re.compile(r"[1-9][0-9]{0,5}")
 

@@ -7,7 +7,6 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
-import yaml
 from numpy.typing import NDArray
 
 from passiflex.limits.confirmation import settled
@@ -18,6 +17,7 @@ from passiflex.robots.flexible import FlexibleJointRobot
 from passiflex.simulation import parse_scenario, resolve
 from passiflex.simulation.altered import rewritten
 from passiflex.simulation.judgement import judge
+from passiflex.texts.yaml_tree import read_back
 
 Array = NDArray[np.float64]
 Report = Callable[[str], None]
@@ -109,7 +109,7 @@ class Attempt:
         gains, box = search.gains(), search.box
         inertia = {"shaped_inertia": [float(v) for v in gains["shaped_inertia"]]}
         own = {"shaped_stiffness": {"ratio": 1}} | inertia
-        data = yaml.safe_load(rewritten(self.problems[0].configuration, {"law": own}))
+        data = read_back(rewritten(self.problems[0].configuration, {"law": own}))
         back = gains | {"shaped_inertia": self.robot.motor_inertia}
         suspects = [*box.centres(), *search.active, search.worst.member]
         if not all(box.radius(m, back) < 1 for m in suspects):

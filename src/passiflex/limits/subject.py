@@ -7,7 +7,7 @@ from pathlib import Path
 from passiflex.errors import ValueRangeError
 from passiflex.simulation import Problem, Scenario, load_scenario, parse_scenario, resolve
 from passiflex.simulation.altered import HIGHEST_RATE, altered, at_rate
-from passiflex.simulation.quantity import Quantity
+from passiflex.texts.quantity import Quantity
 
 Subject = Problem | Scenario | str | Path
 """A problem, a scenario, or the path of a scenario file."""

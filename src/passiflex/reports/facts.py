@@ -17,6 +17,7 @@ from passiflex.simulation.law_settings import (
     Stiffness,
     TargetInertia,
 )
+from passiflex.texts.yaml_tree import RefusedText, Tree
 
 Facts = list[tuple[str, str]]
 GRAVITY = {
@@ -65,17 +66,16 @@ def made_by(run: Run) -> str:
 def shown_configuration(run: Run) -> str:
     """Return the resolved configuration, with a robot file by its name: where it lies is nobody else's business."""
     text = str(run.data.attrs["configuration"])
+    tree = Tree()
     try:
-        whole = yaml.compose(text, Loader=yaml.SafeLoader)
-    except yaml.YAMLError:
-        return re.sub(r"[^\s'\"]*[/\\]", "", text)  # nobody can say which of it is the path
-    found = [v for k, v in whole.value if k.value == "robot"] if isinstance(whole, yaml.MappingNode) else []
-    if not (found and isinstance(found[0], yaml.ScalarNode)):
+        robot = tree.read(text, "a configuration names a robot").get("robot")
+    except RefusedText:
+        return re.sub(r"(?<![^\s'\"])[^\s'\"]*[/\\]", "", text)  # nobody can say which of it is the path
+    name = re.split(r"[/\\]", robot)[-1] if isinstance(robot, str) else robot
+    if name == robot:
         return text
-    start, end = (mark.index for mark in (found[0].start_mark, found[0].end_mark))
-    name = re.split(r"[/\\]", found[0].value)[-1]
-    same = name == found[0].value
-    return text if same else text[:start] + yaml.safe_dump(name).splitlines()[0] + text[end:]
+    there = tree.spans["robot",]
+    return text[: there.start] + yaml.safe_dump(name).splitlines()[0] + text[there.stop :]
 
 
 def _robot(run: Run) -> str:

@@ -82,6 +82,12 @@ def lumped(parts: list[Body]) -> Body:
     return Body(mass, com, components(tensor))
 
 
+def triangle_defect(body: Body, tolerance: float = ROUND_OFF) -> str | None:
+    """Return in which way no distribution of mass has the principal moments of a body, None where one can."""
+    a, b, c = np.linalg.eigvalsh(matrix(body.inertia))
+    return f"{a:.4g} + {b:.4g} < {c:.4g} kg m^2" if a + b < c * (1 - tolerance) else None
+
+
 def check_body(where: str, body: Body, *, whole: bool) -> None:
     """Refuse a negative mass or inertia, and zero ones too if the body is all that a joint moves."""
     if body.mass < 0 or (whole and not body.mass > 0):

@@ -6,29 +6,36 @@ source document stay here.
 
 from __future__ import annotations
 
+import warnings
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import NamedTuple
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
-from passiflex.errors import NameUnknownError, RobotError
+from passiflex.errors import NameUnknownError, PassiflexWarning, RobotError
 from passiflex.robots.bodies import (
     HERE,
-    ROUND_OFF,
     Array,
     Body,
     Pose,
     check_body,
     lumped,
-    matrix,
     rotation_of,
     rpy_of,
+    triangle_defect,
     turned,
 )
-from passiflex.robots.urdf import COMPONENTS, LIMITS, UNLIMITED, Edge, Joint, read_document
+from passiflex.robots.urdf import read_document
+from passiflex.robots.urdf_parts import COMPONENTS, LIMITS, UNLIMITED, Edge, Joint, listed
+
+MOST_JOINTS = 100
+PRINTED = 1e-3
+"""Share by which moments may miss the triangle inequality, as they do when they are printed with few digits."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,26 +81,16 @@ class SerialChain:
             If the document is not a fixed-base serial arm with complete, physical numbers.
         NameUnknownError
             If `end_effector` is not a link of the document.
+
+        Warns
+        -----
+        PassiflexWarning
+            Of what the document can hardly mean: degrees, moments that no body has; and of what is not read of it.
         """
-        name, base, children, inertials = read_document(text_or_path)
-        last, (poses, leaving) = base, _rigid_part(base, children)
-        joints, bodies = [], []
-        while leaving:
-            if len(leaving) > 1:
-                raise RobotError(
-                    "the robot is not serial: moving joints branch",
-                    got=", ".join(repr(e.joint.name) for e in leaving),
-                    needs="one moving joint after another",
-                    try_="making the joints of all branches but one fixed (the fingers of a gripper)",
-                )
-            last = leaving[0].child
-            joints.append(_seen_from(poses[leaving[0].parent], leaving[0].joint))
-            poses, leaving = _rigid_part(last, children)
-            bodies.append(_lump(last, poses, inertials))
-        if not joints:
-            raise RobotError("the robot has no moving joint", needs="revolute, continuous or prismatic ones")
-        tip = poses[_end_effector(end_effector, last, poses, children)]
-        return cls(name, tuple(joints), tuple(bodies), tip.xyz, tip.rotation)
+        chain, remarks = read_chain(text_or_path, end_effector)
+        for remark in remarks:
+            warnings.warn(remark, PassiflexWarning, stacklevel=2)
+        return chain
 
     def with_tool(self, position: ArrayLike, rotation_vector: ArrayLike) -> SerialChain:
         """Return the arm with its end effector moved by `position` [m] and turned [rad], seen from where it was."""
@@ -155,11 +152,52 @@ class SerialChain:
         """Return one line for every body whose principal moments no distribution of mass can have."""
         out = []
         for joint, body in zip(self.joints, self.bodies, strict=True):
-            a, b, c = np.linalg.eigvalsh(matrix(body.inertia))
-            if a + b < c * (1 - ROUND_OFF):
-                moments = f"{a:.4g} + {b:.4g} < {c:.4g} kg m^2"
+            if moments := triangle_defect(body):
                 out.append(f"the link moved by joint {joint.name!r} has principal moments {moments}")
         return out
+
+
+class ReadChain(NamedTuple):
+    """A chain, and a sentence on each thing of its document that it can hardly mean or that is not read."""
+
+    chain: SerialChain
+    remarks: tuple[str, ...]
+
+
+def read_chain(text_or_path: str | Path, end_effector: str | None = None) -> ReadChain:
+    """Return the chain of a URDF document as `SerialChain.from_urdf` does, with its remarks in place of warnings."""
+    document = read_document(text_or_path)
+    base, children, inertials = document.base, document.children, document.inertials
+    last, (poses, leaving) = base, _rigid_part(base, children)
+    joints, bodies, remarks = [], [], list(document.remarks)
+    while leaving:
+        if len(leaving) > 1:
+            raise RobotError(
+                "the robot is not serial: moving joints branch",
+                got=listed(repr(e.joint.name) for e in leaving),
+                needs="one moving joint after another",
+                try_="making the joints of all branches but one fixed (the fingers of a gripper)",
+            )
+        last = leaving[0].child
+        joints.append(_seen_from(poses[leaving[0].parent], leaving[0].joint))
+        if len(joints) > MOST_JOINTS:
+            raise RobotError("the robot has too many moving joints", needs=f"at most {MOST_JOINTS}")
+        poses, leaving = _rigid_part(last, children)
+        bodies.append(_lump(last, poses, inertials))
+        remarks += _hardly(poses, inertials)
+    if not joints:
+        raise RobotError("the robot has no moving joint", needs="revolute, continuous or prismatic ones")
+    tip = poses[_end_effector(end_effector, last, poses, children)]
+    chain = SerialChain(document.name, tuple(joints), tuple(bodies), tip.xyz, tip.rotation)
+    return ReadChain(chain, tuple(remarks))
+
+
+def _hardly(links: Iterable[str], inertials: dict[str, Body]) -> Iterator[str]:
+    """Yield a sentence on each link whose inertia no distribution of mass has."""
+    for link in links:
+        if link in inertials and (moments := triangle_defect(inertials[link], PRINTED)):
+            what = f"link {link!r} has principal moments that no body has"
+            yield f"{what}: {moments}; a digit or a decimal point may be missing in its <inertia>"
 
 
 def _rigid_part(link: str, children: dict[str, list[Edge]]) -> tuple[dict[str, Pose], list[Edge]]:
@@ -169,8 +207,8 @@ def _rigid_part(link: str, children: dict[str, list[Edge]]) -> tuple[dict[str, P
     for parent in queue:
         for edge in children[parent]:
             if edge.fixed:
-                joint = _seen_from(poses[parent], edge.joint)
-                poses[edge.child] = Pose(joint.xyz, rotation_of(joint.rpy))
+                (xyz, R), joint = poses[parent], edge.joint
+                poses[edge.child] = Pose(xyz + R @ joint.xyz, R @ rotation_of(joint.rpy))
                 queue.append(edge.child)
             else:
                 leaving.append(edge)

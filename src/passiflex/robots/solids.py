@@ -10,7 +10,7 @@ import numpy as np
 
 from passiflex.robots.bodies import Array, rotation_of
 from passiflex.robots.chain import SerialChain
-from passiflex.robots.urdf import Joint
+from passiflex.robots.urdf_parts import Joint
 
 SLIM, STOUT = 0.05, 0.35
 """The radius at the base is the smaller of these shares: of the length of the whole arm, of its middle link."""

@@ -14,8 +14,8 @@ from passiflex.simulation.law_settings import (
     Stiffness,
     free_mistakes,
 )
-from passiflex.simulation.quantity import Quantity, shown
-from passiflex.simulation.section import Mistakes, Section
+from passiflex.texts.quantity import Quantity, shown
+from passiflex.texts.section import Mistakes, Section
 
 Vector = tuple[float, ...]
 Found = list[tuple[tuple[str | int, ...], str]]

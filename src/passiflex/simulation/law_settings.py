@@ -9,8 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
 
 from passiflex.errors import ValueRangeError
-from passiflex.simulation.quantity import Quantity
-from passiflex.simulation.section import Mistakes, Section
+from passiflex.texts.quantity import Quantity
+from passiflex.texts.section import Mistakes, Section
 
 Vector = tuple[float, ...]
 Matrix = tuple[Vector, ...]

@@ -6,8 +6,8 @@ from typing import Annotated
 
 from pydantic import Field
 
-from passiflex.simulation.quantity import Quantity
-from passiflex.simulation.section import Section
+from passiflex.texts.quantity import Quantity
+from passiflex.texts.section import Section
 
 Vector = tuple[float, ...]
 Relative = Annotated[float | Vector, Quantity("1", ((), (None,)), above=-1)]

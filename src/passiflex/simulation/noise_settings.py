@@ -6,8 +6,8 @@ from typing import Annotated, Self
 
 from pydantic import Field
 
-from passiflex.simulation.quantity import Quantity
-from passiflex.simulation.section import Mistakes, Section
+from passiflex.texts.quantity import Quantity
+from passiflex.texts.section import Mistakes, Section
 
 
 class Noise(Section):

@@ -7,15 +7,15 @@ from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
-import yaml
 from pydantic import ValidationError
 
 from passiflex.errors import PassiflexError
 from passiflex.robots.catalogue import read_description
-from passiflex.robots.chain import SerialChain
+from passiflex.robots.chain import SerialChain, read_chain
 from passiflex.robots.frames import world_frames
 from passiflex.simulation.run import Run
 from passiflex.simulation.scenario import Tool
+from passiflex.texts.yaml_tree import RefusedText, Tree
 
 NEAR = 1e-6
 """Share of the arm's reach by which its end effector may be off the recorded one."""
@@ -39,7 +39,7 @@ def _candidates(run: Run) -> Iterator[SerialChain]:
     name, text = str(run.data.attrs.get("robot", "")), str(run.data.attrs.get("robot_description", ""))
     if "<" in text:  # anything else would be read as the path of a file
         with suppress(PassiflexError):  # a damaged description: the catalogue may know the robot
-            yield replace(SerialChain.from_urdf(text), name=name or "arm")
+            yield replace(read_chain(text).chain, name=name or "arm")
     settings = _settings(run)
     if settings is not None:
         robot, tool = settings
@@ -53,9 +53,11 @@ def _candidates(run: Run) -> Iterator[SerialChain]:
 def _settings(run: Run) -> tuple[str, Tool] | None:
     """Return robot and tool of the run's configuration, None where that cannot be read."""
     try:
-        configuration = yaml.safe_load(str(run.data.attrs.get("configuration", "")))
+        configuration = Tree().read(
+            str(run.data.attrs.get("configuration", "")), "a configuration names a robot"
+        )
         return str(configuration["robot"]), Tool.model_validate(configuration.get("tool", {}))
-    except (yaml.YAMLError, ValidationError, AttributeError, KeyError, TypeError):
+    except (RefusedText, ValidationError, KeyError):
         return None
 
 

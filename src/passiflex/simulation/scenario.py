@@ -22,10 +22,10 @@ from passiflex.simulation.control_settings import (
 from passiflex.simulation.law_settings import ImpedanceSettings, RigidSettings
 from passiflex.simulation.model_errors import Deviations, ModelErrors
 from passiflex.simulation.noise_settings import Noise
-from passiflex.simulation.quantity import Quantity, shown
 from passiflex.simulation.row_interval import fitting_interval, interval_mistake
-from passiflex.simulation.section import Mistakes, Section
 from passiflex.simulation.tank_settings import TankSettings
+from passiflex.texts.quantity import Quantity, shown
+from passiflex.texts.section import Mistakes, Section
 
 Vector = tuple[float, ...]
 Seconds = Annotated[float, Quantity("s", above=0)]

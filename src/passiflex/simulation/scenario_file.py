@@ -8,11 +8,13 @@ from typing import Any
 from pydantic import ValidationError
 
 from passiflex.errors import ScenarioError
-from passiflex.simulation.model_mistakes import explained
 from passiflex.simulation.scenario import Scenario
-from passiflex.simulation.yaml_tree import Place, RefusedText, Tree
+from passiflex.texts.model_mistakes import explained
+from passiflex.texts.quantity import shown
+from passiflex.texts.text_file import IN_YAML, UnreadableError, decoded, is_path, read_bytes
+from passiflex.texts.yaml_tree import Place, RefusedText, Tree
 
-MAX_BYTES = 1_000_000
+A_SCENARIO = "a scenario needs at least name, robot, posture, law and duration"
 
 
 def load_scenario(path: str | Path) -> Scenario:
@@ -25,6 +27,10 @@ def load_scenario(path: str | Path) -> Scenario:
     ScenarioError
         With one line for each mistake, or one line if the file cannot be read.
     """
+    if not isinstance(path, str | Path) or not str(path).strip():
+        raise ScenarioError(
+            shown(path), ["no scenario; try the path of its file, or parse_scenario for a text"]
+        )
     path = Path(path)
     return parse_scenario(read_text(path), str(path), path.resolve().parent)
 
@@ -38,17 +44,9 @@ def read_text(path: Path) -> str:
         If it cannot be read, is no text or larger than 1 MB.
     """
     try:
-        with path.open("rb") as file:
-            data = file.read(MAX_BYTES + 1)
-        text = data.decode("utf-8-sig") if len(data) <= MAX_BYTES else ""
-    except UnicodeDecodeError:
-        raise ScenarioError(str(path), ["cannot be read: not UTF-8 text"]) from None
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise ScenarioError(str(path), [f"cannot be read: {reason}"]) from None
-    if len(data) > MAX_BYTES:
-        raise ScenarioError(str(path), ["the file is larger than 1 MB"])
-    return text
+        return decoded(read_bytes(path), IN_YAML)
+    except UnreadableError as error:
+        raise ScenarioError(str(path), [f"cannot be read: {error}"]) from None
 
 
 def parse_scenario(text: str, source: str = "scenario", base_dir: str | Path | None = None) -> Scenario:
@@ -61,7 +59,7 @@ def parse_scenario(text: str, source: str = "scenario", base_dir: str | Path | N
     """
     tree = Tree()
     try:
-        data = tree.read(text)
+        data = tree.read(text, A_SCENARIO)
     except RefusedText as error:
         raise ScenarioError(source, [str(error)]) from None
     scenario = read_scenario(data, tree, (), base_dir)
@@ -75,7 +73,7 @@ def read_scenario(
 ) -> Scenario | None:
     """Return the scenario written at a place of the tree; None if it has mistakes, which the tree then has too."""
     robot = data.get("robot")
-    if base_dir is not None and isinstance(robot, str) and _is_path(robot):
+    if base_dir is not None and isinstance(robot, str) and is_path(robot):
         data["robot"] = str(Path(base_dir) / robot)
     try:
         return Scenario.model_validate(data)
@@ -83,8 +81,3 @@ def read_scenario(
         for below, message, at_key in explained(error, data, Scenario):
             tree.report((*place, *below), message, at_key=at_key)
     return None
-
-
-def _is_path(robot: str) -> bool:
-    """Return whether a robot is named by its file, as the catalogue decides it."""
-    return Path(robot).suffix in (".yaml", ".yml") or len(Path(robot).parts) > 1

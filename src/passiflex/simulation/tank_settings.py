@@ -8,8 +8,8 @@ from pydantic import Field, model_validator
 
 from passiflex.control.tank import EnergyTank
 from passiflex.sampled.tanks import TANKS
-from passiflex.simulation.quantity import Quantity
-from passiflex.simulation.section import Mistakes, Section
+from passiflex.texts.quantity import Quantity
+from passiflex.texts.section import Mistakes, Section
 
 Energy = Annotated[float, Quantity("J", least=0)]
 

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from passiflex.simulation.motion import Motion, Pose, circle, hold, minimum_jerk, pose_at
 from passiflex.simulation.problem import Event
-from passiflex.simulation.scenario import Circle, Move, Scenario, Step
+from passiflex.simulation.scenario import Circle, Force, Move, Scenario, Step
 
 Array = NDArray[np.float64]
 
@@ -16,10 +18,13 @@ Array = NDArray[np.float64]
 def timeline(scenario: Scenario, home: Pose) -> tuple[Event, ...]:
     """Return the events in the order of time: each change of the reference or of the wrench is one."""
     motions = _motions(scenario, home)
-    times = {0.0, *motions}
-    for force in scenario.forces:
-        times |= {t for t in (force.start, force.end) if t < scenario.duration}
-    return tuple(Event(t, motions.get(t), _wrench(scenario, t)) for t in sorted(times))
+    wrenches = _wrenches(scenario)
+    times = sorted({0.0, *motions, *(t for t in wrenches if t < scenario.duration)})
+    acting, events = np.zeros(6), []
+    for time in times:
+        acting = wrenches.get(time, acting)
+        events.append(Event(time, motions.get(time), acting.copy()))
+    return tuple(events)
 
 
 def _motions(scenario: Scenario, home: Pose) -> dict[float, Motion]:
@@ -42,9 +47,19 @@ def _motions(scenario: Scenario, home: Pose) -> dict[float, Motion]:
     return motions
 
 
-def _wrench(scenario: Scenario, time: float) -> Array:
-    wrench = np.zeros(6)
+def _wrenches(scenario: Scenario) -> dict[float, Array]:
+    """Return the wrench that acts from each instant on at which a force begins or ends.
+
+    Its numbers are rounded sums of all that act: kept as fractions, a force leaves nothing behind when it ends.
+    """
+    changes: dict[float, list[tuple[int, Force]]] = {}
     for force in scenario.forces:
-        if force.start <= time < force.end:
-            wrench += [*force.force, *force.moment]
-    return wrench
+        changes.setdefault(force.start, []).append((1, force))
+        changes.setdefault(force.end, []).append((-1, force))
+    acting, out = [Fraction(0)] * 6, {}
+    for time in sorted(changes):
+        for sign, force in changes[time]:
+            parts = (*force.force, *force.moment)
+            acting = [sum_ + sign * Fraction(part) for sum_, part in zip(acting, parts, strict=True)]
+        out[time] = np.array([float(part) for part in acting])
+    return out

@@ -8,11 +8,13 @@ from typing import Any, NamedTuple
 
 import yaml
 
-from passiflex.simulation.quantity import shown
+from passiflex.texts.quantity import shown
 
+MAX_CHARACTERS = 4_000_000
 MAX_NODES = 100_000
 MAX_DEPTH = 30
-A_SCENARIO = "a scenario needs at least name, robot, posture, law and duration"
+MOST_LINES = 100
+TOO_MANY = f"more than {MAX_NODES} entries, aliases counted as often as they are used"
 
 Place = tuple[str | int, ...]
 """Where a value is: the names and indices that lead to it."""
@@ -24,6 +26,7 @@ _WORDS = {
     **dict.fromkeys(("false", "False", "FALSE"), False),
     **dict.fromkeys(("", "~", "null", "Null", "NULL")),
 }
+_XML = re.compile(r"\s*<[?!A-Za-z]")
 _SURROGATE = re.compile("[\ud800-\udfff]")
 _STANDARD_TAGS = {f"tag:yaml.org,2002:{kind}" for kind in ("str", "seq", "map")}
 
@@ -39,37 +42,51 @@ class RefusedText(Exception):  # noqa: N818 - becomes a ScenarioError
     """The text is no tree of mappings, lists and scalars of bearable size."""
 
 
+_QUICK: Any = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
+"""For text of our own; the one in C takes a tenth of the time."""
+
+
+class _Bounded(yaml.BaseLoader):
+    """The composer of PyYAML, which gives up early on a text that is too large or too deep for its reader."""
+
+    def __init__(self, text: str):
+        super().__init__(text)
+        self.nodes = self.depth = 0
+
+    def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
+        """Return the next node."""
+        self.nodes += 1
+        self.depth += 1
+        if self.nodes > 2 * MAX_NODES:  # keys are nodes, too
+            raise RefusedText(TOO_MANY)
+        if self.depth > 3 * MAX_DEPTH:
+            raise RefusedText("nested too deeply")
+        node = super().compose_node(parent, index)
+        self.depth -= 1
+        return node
+
+
 class Tree:
-    """A YAML text as Python values, with the mark of every key and value, and the mistakes found so far."""
+    """A YAML text as Python values, with the mark of every key and value, and the mistakes found so far.
+
+    `spans` says from which to which character of the text a value goes.
+    """
 
     def __init__(self) -> None:
         self.keys: dict[Place, Mark] = {}
         self.values: dict[Place, Mark] = {}
+        self.spans: dict[Place, slice] = {}
         self.mistakes: list[tuple[Mark, str, str]] = []
 
-    def read(self, text: str, needs: str = A_SCENARIO) -> dict[str, Any]:
+    def read(self, text: str, needs: str) -> dict[str, Any]:
         """Return the mapping of the text; raise RefusedText where there is none, which says what one needs."""
         try:
-            node = yaml.compose(text, yaml.BaseLoader)
-        except yaml.reader.ReaderError as error:
-            before = text[: error.position]
-            line, column = before.count("\n") + 1, len(before) - before.rfind("\n")
-            raise RefusedText(f"line {line}, column {column}: a character that YAML does not allow") from None
-        except yaml.MarkedYAMLError as error:
-            problem = error.problem_mark or error.context_mark
-            at = f"line {problem.line + 1}, column {problem.column + 1}: " if problem else ""
-            what = ", ".join(p for p in (error.context, error.problem) if p)
-            raise RefusedText(f"{at}no YAML: {_one_line(what)}") from None
-        except RecursionError:
-            raise RefusedText("nested too deeply") from None
-        except (yaml.YAMLError, ValueError, OverflowError) as error:
-            raise RefusedText(f"no YAML: {_one_line(str(error))}") from None
-        if node is None:
-            raise RefusedText(f"empty; {needs}")
-        if not isinstance(node, yaml.MappingNode):
-            mark = _mark(node)
-            raise RefusedText(f"line {mark.line}, column {mark.column}: not a mapping; try 'name: ...'")
-        return self._value(node, ())
+            mapping: dict[str, Any] = self._value(_composed(text, needs), ())
+        except RefusedText:
+            if _XML.match(text):
+                raise RefusedText(f"XML in place of YAML, as of a URDF; {needs}") from None
+            raise
+        return mapping
 
     def report(self, place: Place, message: str, *, at_key: bool = False, mark: Mark | None = None) -> None:
         """Add a mistake at a key or value, or at the nearest thing around it that the file has."""
@@ -79,15 +96,18 @@ class Tree:
         self.mistakes.append((mark or Mark(1, 1), f", {dotted(place)}" if place else "", message))
 
     def lines(self) -> list[str]:
-        """Return the mistakes, one line each, in the order of the file."""
+        """Return the mistakes, one line each, in the order of the file; of very many the first ones."""
         found = [f"line {m.line}, column {m.column}{name}: {text}" for m, name, text in sorted(self.mistakes)]
-        return list(dict.fromkeys(found))
+        found = list(dict.fromkeys(found))
+        more = len(found) - MOST_LINES
+        return [*found[:MOST_LINES], f"and {more} more"] if more > 0 else found
 
     def _value(self, node: yaml.Node, place: Place) -> Any:
         mark = _mark(node)
         self.values[place] = mark
+        self.spans[place] = slice(node.start_mark.index, node.end_mark.index)
         if len(self.values) > MAX_NODES:
-            raise RefusedText(f"more than {MAX_NODES} entries, aliases counted as often as they are used")
+            raise RefusedText(TOO_MANY)
         if len(place) > MAX_DEPTH:
             raise RefusedText(f"line {mark.line}, column {mark.column}: nested too deeply")
         if node.tag not in _STANDARD_TAGS:
@@ -98,7 +118,7 @@ class Tree:
             return self._mapping(node, place)
         if _SURROGATE.search(node.value):
             raise RefusedText(f"line {mark.line}, column {mark.column}: a character that is not Unicode text")
-        plain = isinstance(node, yaml.ScalarNode) and node.style is None
+        plain = isinstance(node, yaml.ScalarNode) and not node.style
         return _scalar(node.value) if plain and node.tag in _STANDARD_TAGS else node.value
 
     def _mapping(self, node: yaml.MappingNode, place: Place) -> dict[str, Any]:
@@ -115,6 +135,41 @@ class Tree:
             self.keys[here] = _mark(key)
             out[key.value] = self._value(child, here)
         return out
+
+
+def _composed(text: str, needs: str) -> yaml.MappingNode:
+    """Return the mapping that a text of bearable size is composed to."""
+    if len(text) > MAX_CHARACTERS:
+        raise RefusedText(f"longer than {MAX_CHARACTERS} characters")
+    try:
+        node = yaml.compose(text, _Bounded)
+    except yaml.reader.ReaderError as error:
+        before = text[: error.position]
+        line, column = before.count("\n") + 1, len(before) - before.rfind("\n")
+        raise RefusedText(f"line {line}, column {column}: a character that YAML does not allow") from None
+    except yaml.MarkedYAMLError as error:
+        problem = error.problem_mark or error.context_mark
+        at = f"line {problem.line + 1}, column {problem.column + 1}: " if problem else ""
+        what = ", ".join(p for p in (error.context, error.problem) if p)
+        raise RefusedText(f"{at}no YAML: {_one_line(what)}") from None
+    except RecursionError:
+        raise RefusedText("nested too deeply") from None
+    except (yaml.YAMLError, ValueError, OverflowError) as error:
+        raise RefusedText(f"no YAML: {_one_line(str(error))}") from None
+    if node is None:
+        raise RefusedText(f"empty; {needs}")
+    if not isinstance(node, yaml.MappingNode):
+        mark = _mark(node)
+        raise RefusedText(f"line {mark.line}, column {mark.column}: not a mapping; try 'name: ...'")
+    return node
+
+
+def read_back(text: str) -> dict[str, Any]:
+    """Return the mapping of a text that the package itself has written."""
+    node = yaml.compose(text, _QUICK)
+    assert node is not None
+    mapping: dict[str, Any] = Tree()._value(node, ())
+    return mapping
 
 
 def _one_line(text: str) -> str:

@@ -11,9 +11,9 @@ from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
 from passiflex.errors import nearest
-from passiflex.simulation.quantity import shown
-from passiflex.simulation.section import Mistakes
-from passiflex.simulation.yaml_tree import Place
+from passiflex.texts.quantity import shown
+from passiflex.texts.section import Mistakes
+from passiflex.texts.yaml_tree import Place
 
 REFUSED_NAME = "refused_name"
 """Type of a PydanticCustomError that is about the name of an entry, not about its value."""

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from passiflex.simulation.quantity import Quantity
+from passiflex.texts.quantity import Quantity
 
 
 @pytest.mark.parametrize(
@@ -53,6 +53,44 @@ from passiflex.simulation.quantity import Quantity
 )
 def test_one_number(unit, written, si):
     assert Quantity(unit).convert(written) == pytest.approx(si, rel=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("wanted", "spellings", "si"),
+    [
+        (
+            "N m/rad",
+            "Nm/rad, N·m/rad, N⋅m/rad, N*m/rad, N-m/rad, N.m/rad, N m rad^-1, N·m·rad⁻¹, N m / rad, N\u00a0m/rad",
+            1.0,
+        ),
+        ("N m/rad", "kNm/rad, kN m/rad, kN·m·rad⁻¹, J/mrad, Nmm/µrad", 1000.0),
+        ("N m/rad", "Nm/deg, Nm/°, N m/degree", 180 / math.pi),
+        ("N m", "Nm, N·m, J, kN mm, Nm/rad", 1.0),
+        ("N m s/rad", "Nms/rad, N m s/rad, Nm s/rad, N·m·s/rad, Nm/(rad/s), Nmsec/rad", 1.0),
+        ("kg m^2", "kg m², kg·m², kgm², kgm^2, kg*m**2, kg-m^2, kg m2, kg.m², N m s²", 1.0),
+        ("kg m^2", "kg cm², kgcm², kgcm^2, kg cm2", 1e-4),
+        ("kg m^2", "g cm^2, gcm²", 1e-7),
+        ("rad/s", "rpm, RPM, rev/min, r/min, U/min, turn/min", math.pi / 30),
+        ("rad/s", "deg/s, °/s, º/s, deg s^-1", math.pi / 180),
+        ("m/s", "mm/s, mm·s⁻¹", 1e-3),
+        ("(N m)^2", "(Nm)^2, (N·m)², N²m², N^2 m^2", 1.0),
+    ],
+)
+def test_a_unit_may_be_spelt_as_on_a_data_sheet(wanted, spellings, si):
+    for unit in spellings.split(", "):
+        assert Quantity(wanted).convert(f"1 {unit}") == pytest.approx(si, rel=1e-14), unit
+        assert Quantity(wanted).convert({"value": 1, "unit": unit}) == pytest.approx(si, rel=1e-14), unit
+
+
+@pytest.mark.parametrize(
+    ("wanted", "unit"), [("rad/s", "Hz"), ("Hz", "rad/s"), ("Hz", "rpm"), ("rad/s", "kHz")]
+)
+def test_a_frequency_is_no_speed(wanted, unit):
+    """To a parser for which a radian is 1, it is one: 2 pi off."""
+    with pytest.raises(
+        ValueError, match="of a frequency and a speed, one counts turns and the other radians"
+    ):
+        Quantity(wanted).convert(f"1 {unit}")
 
 
 @pytest.mark.parametrize("milli", [1, 3, 5, 7, 9, 29, 57])

@@ -1,4 +1,4 @@
-"""What every mapping of a scenario file has in common, and how it reports mistakes."""
+"""What every mapping of a file has in common, and how it reports mistakes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class Mistakes(ValueError):  # noqa: N818 - one exception for all of them
 
 
 class Section(BaseModel):
-    """A mapping of the scenario file; an entry that is left empty counts as left out."""
+    """A mapping of a file; an entry that is left empty counts as left out."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, validate_by_name=True, validate_by_alias=True)
 

@@ -1,4 +1,4 @@
-"""Numbers with units: what a person writes in a scenario file becomes plain SI numbers."""
+"""Numbers with units: what a person writes in a file becomes plain SI numbers."""
 
 from __future__ import annotations
 
@@ -11,13 +11,16 @@ from typing import Any
 from pydantic import GetCoreSchemaHandler
 from pydantic_core import CoreSchema, core_schema
 
+from passiflex.texts.unit_spelling import spelt_out
+
 Numbers = float | tuple["Numbers", ...]
 
 _LONGEST = 80  # characters of one quantity; longer text is no quantity, and is not parsed
 _NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?|[+-]?\.?inf(?![A-Za-z])"
 _TEXT = re.compile(rf"({_NUMBER})\s*(.*)")
 # Names, products, quotients and small powers only: the unit parser evaluates whatever it is given.
-_UNIT = re.compile(r"(?:1\s*/)?(?:[A-Za-zµμ°%*·/() ]|[²³](?![\^²³])|\^-?[1-9](?![0-9^²³.]))*")
+_OFTEN, _TURNING = re.compile("Hz|hertz"), re.compile("rad|deg|°|turn|rp[ms]|revolution|rotation|cycle|arc")
+_UNIT = re.compile(r"(?:1\s*/)?(?:[A-Za-zµ°%/() ]|\^-?[1-9](?![0-9^.]))*")
 
 
 @dataclass(frozen=True)
@@ -129,19 +132,30 @@ def _registry() -> Any:
 
 
 @lru_cache(maxsize=1024)
-def _factor(unit: str, wanted: str) -> float:
-    """Return how many `wanted` are one `unit`."""
+def unit_factor(unit: str, wanted: str) -> float:
+    """Return how many `wanted` are one `unit`.
+
+    Raises
+    ------
+    ValueError
+        If the unit is unknown, of another dimension, or not proportional.
+    """
     if not wanted:
         raise ValueError("plain SI numbers only, as the units are mixed")
-    if len(unit) > _LONGEST or not _UNIT.fullmatch(unit):
+    spelt, aim = spelt_out(unit) if len(unit) <= _LONGEST else "", spelt_out(wanted)
+    if spelt == aim:
+        return 1.0
+    if not spelt or not _UNIT.fullmatch(spelt):
         raise ValueError(f"unknown unit {shown(unit)}")
+    if any(_OFTEN.search(a) and _TURNING.search(b) for a, b in ((spelt, aim), (aim, spelt))):
+        raise ValueError(f"{unit}: of a frequency and a speed, one counts turns and the other radians")
     units = _registry()
     try:
-        got = units.parse_units(unit)
+        got = units.parse_units(spelt)
     except Exception:  # the parser raises whatever its evaluation of the text ran into
         raise ValueError(f"unknown unit {shown(unit)}") from None
     try:
-        target = units.parse_units(wanted)
+        target = units.parse_units(aim)
         none, factor = (float(units.Quantity(k, got).to(target).magnitude) for k in (0.0, 1.0))
     except Exception:  # another dimension
         raise ValueError(unit) from None
@@ -154,7 +168,7 @@ def _in_unit(number: float, unit: str | None, wanted: str) -> float:
     """Return the number in the wanted unit, rounded as if it had been written so: 3 ms is exactly 0.003 s."""
     if unit is None or unit == wanted:
         return number
-    factor = _factor(unit, wanted)
+    factor = unit_factor(unit, wanted)
     inverse = 1 / factor
     if inverse > 1 and math.isclose(inverse, round(inverse), rel_tol=1e-12):
         return number / round(inverse)
