@@ -34,7 +34,7 @@ def cache_folder() -> Path:
     try:
         return Path(os.environ.get("PASSIFLEX_CACHE") or platformdirs.user_cache_dir("passiflex")).absolute()
     except (RuntimeError, KeyError) as error:
-        raise NoCacheError("there is no cache folder", got=error, try_="setting PASSIFLEX_CACHE") from error
+        raise NoCacheError("there is no cache folder", got=error) from error
 
 
 def own_folder(folder: Path) -> Path:

@@ -37,6 +37,7 @@ from passiflex.native.cache import (
 from passiflex.native.cache import loads as _loads
 from passiflex.native.compiler import SUFFIX, Compiler, find_compiler
 
+WRITABLE = "set PASSIFLEX_CACHE to a folder that can be written"
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}")
 
 
@@ -135,10 +136,9 @@ def _from_cache(compiler: Compiler, source: str, name: str) -> Path | None:
         why = f"the cache folder is not safe ({error})"
         remedy = "make it yours alone (chmod go-w), or set PASSIFLEX_CACHE to a folder that is"
     except NoCacheError as error:
-        why, remedy = str(error), "the folder has to be one that can be written"
+        why, remedy = f"{error.what} ({error.got})", WRITABLE
     except OSError as error:
-        why = f"the cache folder cannot be written ({error.strerror})"
-        remedy = "set PASSIFLEX_CACHE to a folder that can be written"
+        why, remedy = f"the cache folder cannot be written ({error.strerror})", WRITABLE
     _warn_once(f"{why}: libraries are compiled again in every process; {remedy}")
     return None
 
