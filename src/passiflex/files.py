@@ -1,8 +1,9 @@
-"""Whole files or none: results are written under a temporary name and then moved."""
+"""Whole files or none: results are written under a temporary name and then moved; what is read back is bounded."""
 
 from __future__ import annotations
 
 import hashlib
+import json
 import os
 import secrets
 import stat
@@ -10,6 +11,7 @@ import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any, NoReturn
 
 from passiflex.errors import PassiflexError
 
@@ -61,6 +63,53 @@ def is_half_written(path: Path) -> bool:
     """Return whether a file is what a killed process left of `whole_file`: its name then ends with its own digest."""
     begin, _, digest = path.stem.rpartition("-")
     return path.name.startswith(".") and len(digest) == 8 and digest == _digest(begin + path.suffix)
+
+
+def read_regular(path: Path, most: int) -> bytes:
+    """Return what a file holds.
+
+    Raises
+    ------
+    OSError
+        If it cannot be read.
+    ValueError
+        If it is no regular file, as a device or pipe, or larger than `most` bytes.
+    """
+    handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
+    with open(handle, "rb") as file:
+        if not stat.S_ISREG(os.fstat(handle).st_mode):
+            raise ValueError("no regular file")
+        data = file.read(most + 1)
+    if len(data) > most:
+        raise ValueError(f"larger than {most / 1e6:g} MB")
+    return data
+
+
+def read_json(text: str) -> Any:
+    """Return what a JSON text says.
+
+    Raises
+    ------
+    ValueError
+        If it is none, has a name twice in one mapping or a number that is none, or is nested too deeply.
+    """
+    try:
+        return json.loads(text, object_pairs_hook=_named_once, parse_constant=_no_number)
+    except RecursionError:
+        raise ValueError("nested too deeply") from None
+
+
+def _named_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    named: dict[str, Any] = {}
+    for name, value in pairs:
+        if name in named:
+            raise ValueError(f"{name[:40]!r} is there twice")
+        named[name] = value
+    return named
+
+
+def _no_number(word: str) -> NoReturn:
+    raise ValueError(f"{word} is no number")
 
 
 def require_writable(folder: Path) -> None:
