@@ -66,8 +66,8 @@ def shown_configuration(run: Run) -> str:
     """Return the resolved configuration, with a robot file by its name: where it lies is nobody else's business."""
     text = str(run.data.attrs["configuration"])
     try:
-        whole = yaml.compose(text, Loader=yaml.SafeLoader)
-    except yaml.YAMLError:
+        whole = yaml.compose(text, Loader=yaml.BaseLoader)
+    except (yaml.YAMLError, RecursionError):
         return re.sub(r"[^\s'\"]*[/\\]", "", text)  # nobody can say which of it is the path
     found = [v for k, v in whole.value if k.value == "robot"] if isinstance(whole, yaml.MappingNode) else []
     if not (found and isinstance(found[0], yaml.ScalarNode)):
