@@ -32,9 +32,14 @@ def made() -> Run:
     return simulate(parse_scenario(PLANAR))
 
 
+@pytest.fixture(scope="module")
+def saved(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return made().save(tmp_path_factory.mktemp("saved") / "run.nc")
+
+
 @pytest.fixture
-def path(tmp_path: Path) -> Path:
-    return made().save(tmp_path / "run.nc")
+def path(saved: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copy(saved, tmp_path / "run.nc"))
 
 
 def refusal(path: Path) -> str:
@@ -207,7 +212,7 @@ ALIASES = "a: &a [x,x,x,x,x,x,x,x,x]\n" + "".join(
 @pytest.mark.parametrize(
     "configuration",
     [
-        "robot: /dev/zero", 'robot: "/a\\0b.yaml"', "robot: " + "[" * 5000, "robot: 2001-99-99",
+        "robot: /dev/zero", 'robot: "/a\\0b.yaml"', "robot: " + "[" * 1500, "robot: 2001-99-99",
         "robot: " + "9" * 5000, ALIASES + "robot: *i", "robot: !!python/name:os.system", "robot: {a: 1}",
         "robot: planar2r\nrobot: planar2r\ntool: 1", "<" * 10_000, "\x07",
     ],
