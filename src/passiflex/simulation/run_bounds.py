@@ -99,12 +99,12 @@ def _attribute_bytes(path: Path, item: h5py.File | h5py.Dataset, size: int) -> i
     total = 0
     for name in item.attrs:
         about = h5py.h5a.open(item.id, name.encode("utf-8", "surrogateescape"))
-        count = int(np.prod(about.shape, dtype=object))
+        count = int(np.prod(about.shape or (), dtype=object))
         text = h5py.check_string_dtype(about.dtype)
         if text is not None and text.length is None:  # as long as it likes, but within the file
             if count > 1 and count * size > ATTRIBUTES:
                 raise _refused(path, f"an attribute of {count} texts, {name!r}")
-            total += len(str(item.attrs[name])) if min(count, size) else 0
+            total += len(str(item.attrs[name]))
         elif (here := count * about.dtype.itemsize) > ATTRIBUTE:
             raise _refused(path, f"an attribute of {here / 1e6:.3g} MB, {name!r}")
         else:
