@@ -33,7 +33,7 @@ ROOMS = (
 )
 """A room imports from itself and from the rooms before it."""
 
-ONLY = {"native": FOUNDATION, "pieces": (*FOUNDATION, "simulation")}
+ONLY = {"native": FOUNDATION, "pieces": (*FOUNDATION, "texts", "simulation")}
 """What a room may import when that is less than the order allows: both know nothing of robots and laws;
 pieces asks simulation for the version only."""
 

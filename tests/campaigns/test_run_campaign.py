@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import subprocess
@@ -214,6 +215,28 @@ def test_the_worst_are_kept_in_full(by: str, tmp_path: Path) -> None:
         assert worst(results, by, 2) == order
         for i, path in zip(order, results.runs, strict=True):
             assert has_numbers(Run.load(path), results, i)
+
+
+def test_runs_that_the_campaign_did_not_write_stay(tmp_path: Path) -> None:
+    c = campaign(samples=5, keep={"worst": 1, "by": "margin"})
+    (first,) = run_campaign(c, tmp_path, workers=0).runs
+    mine = [
+        tmp_path / "runs" / name for name in ("sample_99.nc", "sample_a.nc", "notes.txt", "x_sample_1.nc")
+    ]
+    for path in mine:
+        path.write_text("mine")
+    manifest = tmp_path / "manifest.json"
+    assert json.loads(manifest.read_text())["runs"] == [first.name]
+    (second,) = run_campaign(c, tmp_path, samples=11, workers=0).runs
+    assert second != first
+    assert set((tmp_path / "runs").iterdir()) == {second, *mine}
+    assert all(path.read_text() == "mine" for path in mine)
+    content = json.loads(manifest.read_text())
+    del content["runs"]  # as before it said which they are
+    manifest.write_text(json.dumps(content))
+    (tmp_path / "runs" / first.name).write_text("of before")
+    assert run_campaign(c, tmp_path, samples=11, workers=0).runs == (second,)
+    assert (tmp_path / "runs" / first.name).read_text() == "of before"
 
 
 def has_numbers(run: Run, results: Results, sample: int) -> bool:

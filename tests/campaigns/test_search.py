@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -228,6 +229,33 @@ def test_the_record_says_all(tmp_path: Path) -> None:
     path = tmp_path / "campaign.yaml"
     path.write_text(data["campaign"])
     assert load_campaign(path) == campaign(PUSHED, parameters=BORDER)
+
+
+def test_a_search_removes_what_its_record_names_and_nothing_else(tmp_path: Path) -> None:
+    found = searched("torque_peak", evaluations=16)
+    three = replace(found, cases=found.cases[:1] * 3)
+    mine = [tmp_path / name for name in ("worst_case.yaml", "worst_9.yaml", "../worst_1.yaml")]
+    for path in mine:
+        path.write_text("mine")
+    assert len(three.save(tmp_path)) == 4
+    record = tmp_path / "search.json"
+    data = json.loads(record.read_text())
+    data["cases"] += [{"scenario": "../worst_1.yaml"}, {"scenario": "worst_case.yaml"}]
+    record.write_text(json.dumps(data))
+    replace(found, cases=found.cases[:1]).save(tmp_path)
+    left = {path.name for path in tmp_path.iterdir()}
+    assert left == {"worst_1.yaml", "search.json", "worst_case.yaml", "worst_9.yaml"}
+    assert all(path.read_text() == "mine" for path in mine)
+
+
+@pytest.mark.parametrize(
+    "content", ["", "{", "[]", '{"cases": 1}', '{"cases": [1]}', '{"cases": [{}]}', "[" * 10**5]
+)
+def test_a_record_that_is_none_removes_nothing(tmp_path: Path, content: str) -> None:
+    (tmp_path / "search.json").write_text(content)
+    (tmp_path / "worst_2.yaml").write_text("mine")
+    replace(searched("torque_peak", evaluations=16), cases=()).save(tmp_path)
+    assert (tmp_path / "worst_2.yaml").read_text() == "mine"
 
 
 def test_a_robot_from_a_file_is_found_from_anywhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -97,7 +97,7 @@ def test_a_tool_of_a_description_is_kept() -> None:
 
 
 def test_a_tool_turns_with_the_flange_that_carries_it(tmp_path: Path) -> None:
-    """The robot's own end effector is turned already, and an older file names only robot and tool."""
+    """The robot's own end effector is turned already; a file that a run names is not opened for it."""
     data = Path(str(resources.files("passiflex.robots") / "data"))
     fixed = '<child link="tool"/>\n    <origin xyz="0.4 0 0" rpy="0 0 0"/>'
     urdf = (data / "planar2r.urdf").read_text(encoding="utf-8")
@@ -107,9 +107,11 @@ def test_a_tool_turns_with_the_flange_that_carries_it(tmp_path: Path) -> None:
     robot = tmp_path / "turned.yaml"
     robot.write_text((data / "planar2r.yaml").read_text(encoding="utf-8"), encoding="utf-8")
     run = simulate(parse_scenario(SCENARIO.replace("robot: planar2r", f"robot: {robot}")))
+    own, named = chain_of(run), read_description(robot).chain.with_tool((0.05, 0, 0.02), (0, 0.3, 0))
     del run.data.attrs["robot_description"]
-    chain = chain_of(run)
-    assert chain is not None
-    frames = world_frames(chain, run["q"])
-    np.testing.assert_allclose(frames.position[:, -1], run["position"], atol=1e-12)
-    np.testing.assert_allclose(frames.rotation[:, -1], run["rotation"], atol=1e-12)
+    assert chain_of(run) is None
+    assert own is not None
+    for chain in (own, named):
+        frames = world_frames(chain, run["q"])
+        np.testing.assert_allclose(frames.position[:, -1], run["position"], atol=1e-12)
+        np.testing.assert_allclose(frames.rotation[:, -1], run["rotation"], atol=1e-12)

@@ -196,4 +196,7 @@ def test_there_is_no_ideal_without_configuration_or_without_the_robot_that_it_ne
     elsewhere = PUSHED | {"robot": "gone.yaml"}
     assert ideal_motion(altered(continuous(), configuration=yaml.safe_dump(elsewhere))) is not None
     ratio = elsewhere | {"law": PUSHED["law"] | {"damping": {"ratio": 0.7}}}
-    assert ideal_motion(altered(continuous(), configuration=yaml.safe_dump(ratio))) is None
+    assert ideal_motion(altered(continuous(), configuration=yaml.safe_dump(ratio))) is not None
+    older = altered(continuous(), configuration=yaml.safe_dump(ratio))
+    del older.data.attrs["joint_parameters"]
+    assert ideal_motion(older) is None

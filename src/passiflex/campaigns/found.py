@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -11,13 +12,14 @@ from typing import Any, NamedTuple
 from passiflex.campaigns.measures import MEASURES
 from passiflex.campaigns.samples import Values
 from passiflex.errors import UnstableLoopError
-from passiflex.files import whole_file
+from passiflex.files import read_json, read_regular, whole_file
 from passiflex.simulation.admissible import require_stable
 from passiflex.simulation.problem import Problem
 from passiflex.simulation.run import package_version, source_commit
 from passiflex.simulation.scenario import Scenario
 
 NAME = "search.json"
+MOST_BYTES = 100_000_000
 
 
 class Case(NamedTuple):
@@ -90,22 +92,33 @@ class Found:
         }
 
     def save(self, folder: str | Path) -> list[Path]:
-        """Write worst_1.yaml … and search.json, and return the paths; those of another search go.
+        """Write worst_1.yaml … and search.json, and return the paths; those that an earlier search names there go.
 
         Raises
         ------
         OutputError
             If they cannot be written.
         """
+        before = _files_of_before(Path(folder) / NAME)
         texts = {_file(i): case.scenario.to_yaml() for i, case in enumerate(self.cases)}
         texts[NAME] = json.dumps(self.to_dict(), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
         paths = [Path(folder) / name for name in texts]
         for path, text in zip(paths, texts.values(), strict=True):
             with whole_file(path) as temporary:
                 temporary.write_text(text, encoding="utf-8")
-        for other in set(Path(folder).glob("worst_*.yaml")) - set(paths):
-            other.unlink()
+        for other in {Path(folder) / name for name in before} - set(paths):
+            other.unlink(missing_ok=True)
         return paths
+
+
+def _files_of_before(path: Path) -> set[str]:
+    """Return the names of the scenarios that a record lists; none if it cannot be read, or is no record."""
+    try:
+        cases = read_json(read_regular(path, MOST_BYTES).decode("utf-8"))["cases"]
+        names = {str(case["scenario"]) for case in cases}
+    except (OSError, ValueError, LookupError, TypeError):
+        return set()
+    return {name for name in names if re.fullmatch(r"worst_\d+\.yaml", name)}
 
 
 def case_scenario(scenario: Scenario, problem: Problem, rank: int) -> Scenario:

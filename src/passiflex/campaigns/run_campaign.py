@@ -29,7 +29,7 @@ from passiflex.pieces.cluster import Cluster
 from passiflex.pieces.engines import Engine, InProcess, LocalProcesses
 from passiflex.pieces.manifest import load_manifest
 from passiflex.pieces.run_pieces import Progress, run_pieces
-from passiflex.pieces.store import open_store
+from passiflex.pieces.store import Store, open_store
 from passiflex.pieces.stored_rows import read_blocks, read_rows
 from passiflex.simulation import resolve
 from passiflex.simulation.admissible import require_stable
@@ -124,7 +124,7 @@ def run_campaign(
         with open_store(folder, text, campaign.samples, extends=prefix, identity=identity) as store:
             run_pieces(store, evaluate_samples, engine, on_progress)
             results = Results(Path(folder), campaign)
-            return Results(results.folder, campaign, _keep_worst(results))
+            return Results(results.folder, campaign, _keep_worst(results, store))
 
 
 def worst(results: Results, measure: str, count: int) -> list[int]:
@@ -148,20 +148,22 @@ def worst(results: Results, measure: str, count: int) -> list[int]:
     return [samples[i] for i in ranked[:count]]
 
 
-def _keep_worst(results: Results) -> tuple[Path, ...]:
+def _keep_worst(results: Results, store: Store) -> tuple[Path, ...]:
+    """Write the full runs of the worst samples; those of an earlier end of this campaign go, and nobody else's."""
     keep = results.campaign.keep
     if keep.by is None:
         return ()
-    folder = results.folder / RUNS
-    paths = []
-    for i in worst(results, keep.by, keep.worst):
-        path = _run_file(results.folder, i)
-        if not path.exists():
-            run_sample(results.campaign, i).save(path)
-        paths.append(path)
-    for other in set(folder.glob("sample_*.nc")) - set(paths):  # an extended campaign has other worst samples
-        other.unlink()
-    return tuple(paths)
+    paths = {i: _run_file(results.folder, i) for i in worst(results, keep.by, keep.worst)}
+    missing = {i: path for i, path in paths.items() if not path.exists()}
+    written = {*store.manifest.runs, *(path.name for path in missing.values())}
+    store.own_runs(written)
+    for i, path in missing.items():
+        run_sample(results.campaign, i).save(path)
+    others = written - {path.name for path in paths.values()}
+    for name in others:
+        (results.folder / RUNS / name).unlink(missing_ok=True)
+    store.own_runs(written - others)
+    return tuple(paths.values())
 
 
 def _run_file(folder: Path, sample: int) -> Path:

@@ -2,11 +2,20 @@
 
 from __future__ import annotations
 
+import signal
 import sys
+import traceback
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from types import FrameType
+
     from cyclopts import App
+
+FAULT = 70
+"""Exit status of a fault of ours, as sysexits.h has it: never that of a verdict."""
 
 
 def application() -> App:
@@ -22,17 +31,50 @@ def application() -> App:
 
 
 def main() -> None:
-    """Run the command line; a mistake of the user ends with one line on what to do, not with a traceback."""
+    """Run the command line; a mistake of the user ends with one line on what to do, not with a traceback.
+
+    The exit status is that of the command; 2 for a mistake of the user, FAULT for one of ours, 128 and the number
+    of the signal for an interruption, CLOSED_PIPE where nobody reads what is printed.
+    """
+    from passiflex.cli.terminal import leave_closed_pipe, printable, replace_what_cannot_be_shown
     from passiflex.errors import PassiflexError
 
+    replace_what_cannot_be_shown()
     try:
-        status = application()(sys.argv[1:], result_action="return_value")
+        with _ended_quietly():
+            status = application()(sys.argv[1:], result_action="return_value")
+            if sys.stdout is not None:
+                sys.stdout.flush()
     except PassiflexError as error:
-        print(f"passiflex: {error}", file=sys.stderr)
+        print(f"passiflex: {printable(str(error))}", file=sys.stderr)
         sys.exit(2)
     except KeyboardInterrupt:
         print(
             "passiflex: interrupted; nothing is half-written, and the same command goes on", file=sys.stderr
         )
-        sys.exit(130)
+        sys.exit(128 + signal.SIGINT)
+    except BrokenPipeError:
+        leave_closed_pipe()
+    except Exception:
+        traceback.print_exc()
+        print("passiflex: this is a fault of passiflex, not of yours; please report it", file=sys.stderr)
+        sys.exit(FAULT)
     sys.exit(status if isinstance(status, int) else 0)
+
+
+@contextmanager
+def _ended_quietly() -> Iterator[None]:
+    """Let the signals that end a program end this one with its exit status, after what a `finally` has to do."""
+
+    def end(number: int, _: FrameType | None) -> None:
+        raise SystemExit(128 + number)
+
+    before = {number: signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGHUP)}
+    ours = [number for number, handler in before.items() if handler is signal.SIG_DFL]  # as nohup ignores one
+    for number in ours:
+        signal.signal(number, end)
+    try:
+        yield
+    finally:
+        for number in ours:
+            signal.signal(number, signal.SIG_DFL)

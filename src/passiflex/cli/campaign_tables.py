@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from rich.markup import escape
 from rich.table import Column, Table
+from rich.text import Text
 
 from passiflex.campaigns.found import Found
 from passiflex.campaigns.importance import Association, Index
@@ -47,12 +47,12 @@ def quantile_table(found: Statistics) -> Table:
     for spread in found.spreads:
         none = str(spread.not_finite or "")
         if not spread.finite:
-            table.add_row(_named(spread.metric), *[""] * 4, none)
+            table.add_row(with_unit(spread.metric), *[""] * 4, none)
             continue
         low, _, median, _, high = spread.quantiles
         interval = f"{median.low:.3g} – {median.high:.3g}"
         numbers = [f"{q.value:.3g}" for q in (low, median, high)]
-        table.add_row(_named(spread.metric), *numbers[:2], interval, numbers[2], none)
+        table.add_row(with_unit(spread.metric), *numbers[:2], interval, numbers[2], none)
     return table
 
 
@@ -66,7 +66,8 @@ def importance_table(found: Statistics, most: int = MOST) -> Table:
     for metric in dict.fromkeys(a.metric for a in found.associations):
         of = [a for a in found.associations if a.metric == metric and not math.isnan(a.strength)]
         ranked = sorted(of, key=lambda a: -a.weight)
-        table.add_row(f"[bold]{_named(metric)}[/bold]" + ("" if ranked else ": nothing that varies"))
+        heading = Text.assemble((with_unit(metric), "bold"), "" if ranked else ": nothing that varies")
+        table.add_row(heading)
         for a in ranked[:most]:
             table.add_row(*_association(a))
         if len(ranked) > most:
@@ -77,7 +78,7 @@ def importance_table(found: Statistics, most: int = MOST) -> Table:
 def worst_table(found: Statistics) -> Table:
     """Return the worst samples with what was drawn for them."""
     drawn = Column("drawn", overflow="fold")
-    table = Table("sample", _named(found.by), "verdict", drawn, title=f"the worst by {found.by}")
+    table = Table("sample", with_unit(found.by), "verdict", drawn, title=f"the worst by {found.by}")
     for worst in found.worst:
         table.add_row(str(worst.sample), f"{worst.value:.5g}", worst.verdict, _listed(worst.draws))
     return table
@@ -87,7 +88,7 @@ def found_table(found: Found) -> Table:
     """Return the worst cases of a search."""
     refused = f", {found.refused} of them impossible" if found.refused else ""
     table = Table(
-        "file", _named(found.measure), "verdict", Column("values", overflow="fold"),
+        "file", with_unit(found.measure), "verdict", Column("values", overflow="fold"),
         title=f"the worst by {found.measure}", caption=f"{found.evaluations} simulations{refused}",
     )  # fmt: skip
     for i, case in enumerate(found.cases):
@@ -130,8 +131,3 @@ def _value(value: object) -> str:
 
 def _level(found: Statistics) -> str:
     return f"{100 * found.level:.4g} % interval"
-
-
-def _named(metric: str) -> str:
-    """Return the name of a metric; its unit in brackets is no mark-up."""
-    return escape(with_unit(metric))

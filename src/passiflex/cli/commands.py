@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import cyclopts
 from rich.table import Table
+from rich.text import Text
 
 from passiflex.cli.terminal import app, console, progress_lines, timed
 
@@ -72,7 +73,7 @@ def simulate(
             require_writable(out.parent)
             problem = resolve(read)
             for caution in cautions(problem):
-                console.print(f"note: {caution}", markup=False)
+                console.print(f"note: {caution}")
             report(f"{read.name}: compiling and running")
             run = simulate_problem(problem)
         if run.failure:
@@ -80,7 +81,7 @@ def simulate(
         if run.sampled:
             _print_control(run)
         for passed in passed_limits(run):
-            console.print(f"{passed}", markup=False)
+            console.print(f"{passed}")
         console.print(f"wrote {run.save(out)}")
     return 2 if run.failure else 0
 
@@ -95,7 +96,7 @@ def audit(run: Path) -> int:
 
     read = Run.load(run)
     for remark in remarks(read.data):
-        console.print(f"{run}: {remark}", markup=False)
+        console.print(f"{run}: {remark}")
     result = audit_run(read)
     table = Table(
         "balance", "change of stored energy", "supplied", "dissipated", "largest residual", title=str(run)
@@ -113,11 +114,11 @@ def audit(run: Path) -> int:
     if not result.every_step:
         console.print("judged by the rows of the file alone: what happened between them was not noted")
     if result.books_error > max(10 * result.integration_error, 1e-6):
-        console.print(_wrong_books(read, result), markup=False)
+        console.print(_wrong_books(read, result))
     if read.sampled:
         _print_control(read)
     for passed in passed_limits(read):
-        console.print(f"{passed}", markup=False)
+        console.print(f"{passed}")
     if result.verdict != "passive":
         console.print(f"remedy: {result.remedy}")
     return EXIT[result.verdict]
@@ -159,11 +160,11 @@ def limits(
             if out is not None:
                 require_writable(out)
             found = limit_map(problem, pictured=why or out is not None, report=report)
-        console.print(found.sentence, markup=False)
+        console.print(found.sentence)
         if found.admissible.stable:
             console.print(found.margin.words)
         for line in why_lines(found) if why else ():
-            console.print(line, markup=False)
+            console.print(line)
         console.print(border_table(found))
         console.print(confirmation_table(found))
         if recommend:
@@ -184,9 +185,9 @@ def robots() -> int:
 
     for name in catalogue():
         description = read_description(name)
-        console.print(f"[bold]{name}[/bold]: {description.chain.n} joints")
+        console.print(Text.assemble((name, "bold"), f": {description.chain.n} joints"))
         for quantity, source in description.sources.items():
-            console.print(f"  {quantity}: {source}", markup=False)
+            console.print(f"  {quantity}: {source}")
     return 0
 
 
@@ -209,10 +210,10 @@ def _print_recommendation(problem: Problem) -> None:
         with progress_lines() as report:
             advice = recommend_for(problem, report=report)
     except ValueRangeError as nothing:
-        console.print(f"recommended: nothing; {nothing}", markup=False)
+        console.print(f"recommended: nothing; {nothing}")
         return
-    console.print(f"recommended: {advice.sentence}", markup=False)
-    console.print(advice.snippet, markup=False)
+    console.print(f"recommended: {advice.sentence}")
+    console.print(advice.snippet)
 
 
 def _print_control(run: Run) -> None:

@@ -106,7 +106,7 @@ def _read(*paths: Path) -> list[Salvaged]:
     read = [salvage(path) for path in paths]
     for path, (_, notices) in zip(paths, read, strict=True):
         for notice in notices:
-            console.print(f"{path}: {notice}", markup=False)
+            console.print(f"{path}: {notice}")
     return read
 
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from passiflex.exports.quaternions import quaternions
 from passiflex.exports.rerun_stream import BLUE, GREY, ORANGE, PINK, RED, Colour, Stream
 from passiflex.robots.bodies import Array
 from passiflex.robots.chain import SerialChain
@@ -56,7 +57,7 @@ def _log_arm(stream: Stream, chain: SerialChain, run: Run) -> None:
             position, rotation = frames.position[:, i], frames.rotation[:, i]
             good = np.isfinite(position).all(axis=1) & np.isfinite(rotation).all(axis=(1, 2))
             if good.any():
-                turns = Rotation.from_matrix(rotation[good]).as_quat(canonical=True)
+                turns = quaternions(rotation[good])
                 moves = stream.rr.Transform3D.columns(translation=position[good], quaternion=turns)
                 stream.columns(place, run.time[good], moves)
         if i < len(bodies):

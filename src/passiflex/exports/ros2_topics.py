@@ -7,8 +7,8 @@ from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
+from passiflex.exports.quaternions import quaternions
 from passiflex.exports.signals import Signal
 from passiflex.robots.bodies import Array
 from passiflex.robots.chain import SerialChain
@@ -51,10 +51,12 @@ def topics_of(chain: SerialChain | None, signals: Sequence[Signal], time: Sequen
             joints = [joint.name for joint in chain.joints] if chain is not None else []
             states = _joint_states(known, parts, headers, joints)
             yield Topic(name, "sensor_msgs/JointState", units, states)
+    beside = None  # all poses on one side: the error of a tool that points down is no jump
     for name, (position, rotation) in POSES.items():
         if position in known and rotation in known:
             taken.update((position, rotation))
-            poses = _poses(known[position].values, known[rotation].values)
+            poses = _poses(known[position].values, known[rotation].values, beside)
+            beside = beside if beside is not None else _first_turn(poses)
             message = _stamped("pose", poses, headers, "base")
             yield Topic(name, "geometry_msgs/PoseStamped", {"position": ("m",)}, message)
     if "wrench" in known:
@@ -147,16 +149,27 @@ def _stamped(
     return message
 
 
-def _poses(position: Array, rotation: Array) -> list[Message | None]:
-    """Return poses of positions (N, 3) and rotations (N, 3, 3), None where one is not finite."""
+def _poses(position: Array, rotation: Array, beside: Array | None = None) -> list[Message | None]:
+    """Return poses of positions (N, 3) and rotations (N, 3, 3), None where one is not finite.
+
+    Parameters
+    ----------
+    beside: A quaternion on whose side the first one is.
+    """
     rotation = rotation.reshape(-1, 3, 3)
     poses: list[Message | None] = [None] * len(position)
     good = np.flatnonzero(np.isfinite(position).all(axis=1) & np.isfinite(rotation).all(axis=(1, 2)))
     if good.size:
-        turns = Rotation.from_matrix(rotation[good]).as_quat(canonical=True)
+        turns = quaternions(rotation[good], beside)
         for row, p, turn in zip(good.tolist(), position[good].tolist(), turns.tolist(), strict=True):
             poses[row] = {"position": _xyz(p), "orientation": dict(zip("xyzw", turn, strict=True))}
     return poses
+
+
+def _first_turn(poses: Sequence[Message | None]) -> Array | None:
+    """Return the first quaternion of poses, None where there is none."""
+    first = next((pose["orientation"] for pose in poses if pose is not None), None)
+    return None if first is None else np.array([first[axis] for axis in "xyzw"])
 
 
 def _xyz(numbers: Sequence[float]) -> Message:

@@ -1,5 +1,6 @@
 """CasADi functions as compiled code: generate C, compile once, call without copies, integrate."""
 
+from passiflex.native.cache import cache_folder as cache_folder
 from passiflex.native.compiler import Compiler as Compiler
 from passiflex.native.compiler import find_compiler as find_compiler
 from passiflex.native.fixed_step import DRIVER as DRIVER
@@ -15,7 +16,6 @@ from passiflex.native.lane_data import LaneInputs as LaneInputs
 from passiflex.native.lane_data import LaneState as LaneState
 from passiflex.native.lane_loop import LaneFunctions as LaneFunctions
 from passiflex.native.lane_loop import LaneLoop as LaneLoop
-from passiflex.native.library import cache_folder as cache_folder
 from passiflex.native.library import compile_functions as compile_functions
 from passiflex.native.library import compile_source as compile_source
 from passiflex.native.library import load_external as load_external

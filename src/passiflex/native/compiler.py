@@ -9,17 +9,19 @@ from __future__ import annotations
 import functools
 import importlib.metadata
 import importlib.util
+import json
 import os
 import platform
 import shlex
 import shutil
 import subprocess
 import sys
-import tempfile
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from passiflex.errors import CompilerError, NameUnknownError
+from passiflex.native import builder
 
 # Only what the header exports is visible: calls inside the library can then be inlined.
 FLAGS = (
@@ -32,6 +34,7 @@ FLAGS = (
     "-DGCC_HASCLASSVISIBILITY",
 )
 SUFFIX = ".dylib" if sys.platform == "darwin" else ".so"
+PROBE = "double probe(double x) { return x + 1; }\n"
 _ZIG_MACHINES = {"amd64": "x86_64", "arm64": "aarch64", "i686": "x86", "ppc64le": "powerpc64le"}
 
 
@@ -50,25 +53,57 @@ class Compiler:
     identity: str
     flags: tuple[str, ...] = FLAGS
 
-    def build(self, source: Path, target: Path) -> None:
-        """Compile the C file `source` into the shared library `target`.
+    def build(self, source: str, target: Path | None) -> None:
+        """Compile a C text into the shared library `target`, whole or not at all; only try to, if that is None.
+
+        A process of its own does it: were this one killed, it would end the compiler and remove what it has made.
 
         Raises
         ------
         CompilerError
             With the last lines that the compiler wrote.
+        OSError
+            If the library cannot be written.
         """
-        command = [*self.argv, *self.flags, str(source), "-o", str(target), "-lm"]
-        try:
-            done = subprocess.run(command, capture_output=True, text=True, errors="replace", check=False)
-        except OSError as error:
-            raise CompilerError("the C compiler cannot be started", got=f"{self.argv[0]}: {error}") from error
-        if done.returncode or not target.is_file():
+        request = {
+            "source": source,
+            "before": [*self.argv, *self.flags],
+            "after": ["-lm"],
+            "target": target and str(target),
+        }
+        answer = _asked(request)
+        if (error := answer.get("error")) is not None:
+            raise OSError(*error)
+        if (why := answer.get("unstarted")) is not None:
+            raise CompilerError("the C compiler cannot be started", got=f"{self.argv[0]}: {why}")
+        if (status := answer["status"]) is not None:
             raise CompilerError(
-                f"{shlex.join(self.argv)} stopped with exit status {done.returncode} and made no library",
-                got="\n" + "\n".join(done.stderr.splitlines()[-12:]) + "\n",
+                f"{shlex.join(self.argv)} stopped with exit status {status} and made no library",
+                got=f"\n{answer['said']}\n",
                 try_="another compiler in $CC, or PASSIFLEX_COMPILER=none to run without one, slower",
             )
+
+
+def _asked(request: dict[str, Any]) -> dict[str, Any]:
+    """Return the answer of a builder."""
+    words = [sys.executable, "-I", "-S", builder.__file__]
+    with subprocess.Popen(
+        words,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        start_new_session=True,  # Ctrl-C in a terminal comes by way of this process
+    ) as process:
+        assert process.stdin is not None
+        assert process.stdout is not None
+        process.stdin.write(json.dumps(request).encode() + b"\n")
+        process.stdin.flush()  # and it stays open: its end is the end of this process
+        said = process.stdout.read()
+    try:
+        return dict(json.loads(said))
+    except ValueError as error:
+        got = said.decode(errors="replace").strip().rpartition("\n")[2] or f"exit status {process.returncode}"
+        raise CompilerError("the process that runs the compiler ended", got=got) from error
 
 
 def find_compiler() -> Compiler | None:
@@ -129,17 +164,14 @@ def _system(argv: tuple[str, ...], path: str) -> Compiler:
         [*argv, "--version"], capture_output=True, text=True, errors="replace", check=False
     )
     identity = f"{shlex.join(argv)}\n{version.stdout}"
-    with tempfile.TemporaryDirectory(prefix="passiflex-") as folder:
-        source = Path(folder, "probe.c")
-        source.write_text("double probe(double x) { return x + 1; }\n")
-        for flags in ((*FLAGS, "-march=native"), FLAGS):
-            compiler = Compiler(argv, identity, flags)
-            try:
-                compiler.build(source, source.with_suffix(SUFFIX))
-            except CompilerError as error:
-                failure = error
-            else:
-                return compiler
+    for flags in ((*FLAGS, "-march=native"), FLAGS):
+        compiler = Compiler(argv, identity, flags)
+        try:
+            compiler.build(PROBE, None)
+        except CompilerError as error:
+            failure = error
+        else:
+            return compiler
     raise failure
 
 

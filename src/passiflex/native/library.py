@@ -7,7 +7,6 @@ never stale. Generating the C text again costs 1–2 µs per node; it is not wor
 from __future__ import annotations
 
 import atexit
-import ctypes
 import functools
 import hashlib
 import os
@@ -24,11 +23,21 @@ from pathlib import Path
 from typing import Any
 
 import casadi as cs
-import platformdirs
 
 from passiflex.errors import CompilerError, PassiflexWarning, ValueRangeError
+from passiflex.native.builder import SEAL
+from passiflex.native.cache import (
+    DistrustError,
+    NoCacheError,
+    cache_folder,
+    is_there,
+    make_folder,
+    own_folder,
+)
+from passiflex.native.cache import loads as _loads
 from passiflex.native.compiler import SUFFIX, Compiler, find_compiler
 
+WRITABLE = "set PASSIFLEX_CACHE to a folder that can be written"
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}")
 
 
@@ -72,31 +81,8 @@ def compile_source(source: str) -> Path:
     compiler = find_compiler()
     if compiler is None:
         raise CompilerError("no C compiler", needs="gcc, clang, or the extra passiflex[zig]")
-    path = cache_folder() / (_key(source, compiler) + SUFFIX)
-    if _loads(path):
-        return path
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        workspace = tempfile.TemporaryDirectory(prefix="build-", dir=path.parent)
-    except OSError as error:
-        _warn_once(
-            f"the cache folder cannot be written ({error}): libraries are compiled again in every process; "
-            "set PASSIFLEX_CACHE to a folder that can be written"
-        )
-        path = _process_folder() / path.name
-        if _loads(path):
-            return path
-        workspace = tempfile.TemporaryDirectory(prefix="build-", dir=path.parent)
-    with workspace as folder:
-        _build(compiler, source, Path(folder), path)
-    if not _loads(path):
-        raise CompilerError(
-            "the compiled library does not load",
-            got=path,
-            needs="a folder from which libraries may be loaded, and a compiler for this processor",
-            try_="setting PASSIFLEX_CACHE to another folder (is this one noexec?)",
-        )
-    return path
+    name = _key(source, compiler) + SUFFIX
+    return _from_cache(compiler, source, name) or _ready(compiler, source, _fallback_folder() / name)
 
 
 def load_external(name: str, path: Path, **opts: Any) -> cs.Function:
@@ -128,11 +114,6 @@ def c_source(name: str) -> str:
     return resources.files("passiflex.native").joinpath(name).read_text(encoding="utf-8")
 
 
-def cache_folder() -> Path:
-    """Return the folder of compiled libraries: `$PASSIFLEX_CACHE`, else the user's cache folder."""
-    return Path(os.environ.get("PASSIFLEX_CACHE") or platformdirs.user_cache_dir("passiflex")).absolute()
-
-
 def _check_names(names: list[str]) -> None:
     for name in names:
         if not _NAME.fullmatch(name):
@@ -147,30 +128,42 @@ def _check_names(names: list[str]) -> None:
             )
 
 
-def _build(compiler: Compiler, source: str, workspace: Path, path: Path) -> None:
-    """Compile in `workspace`, on the same file system, then put the library in place in one step."""
-    text, built = workspace / "generated.c", workspace / path.name
-    text.write_text(source, encoding="utf-8")
-    compiler.build(text, built)
-    with built.open("rb") as file:
-        os.fsync(file.fileno())  # a name must never come to stand for half a library, even after a power cut
-    os.replace(built, path)
-
-
-def _loads(path: Path) -> bool:
-    """Return whether `path` is a library that can be loaded (absent, empty and damaged files are not)."""
+def _from_cache(compiler: Compiler, source: str, name: str) -> Path | None:
+    """Return the library in the user's cache; None, after a warning, if that cannot hold one."""
     try:
-        if path.stat().st_size == 0:
-            return False
-        ctypes.CDLL(str(path))
-    except OSError:
-        return False
-    return True
+        return _ready(compiler, source, own_folder(make_folder(cache_folder())) / name)
+    except DistrustError as error:
+        why = f"the cache folder is not safe ({error})"
+        remedy = "make it yours alone (chmod go-w), or set PASSIFLEX_CACHE to a folder that is"
+    except NoCacheError as error:
+        why, remedy = f"{error.what} ({error.got})", WRITABLE
+    except OSError as error:
+        why, remedy = f"the cache folder cannot be written ({error.strerror})", WRITABLE
+    _warn_once(f"{why}: libraries are compiled again in every process; {remedy}")
+    return None
+
+
+def _ready(compiler: Compiler, source: str, path: Path) -> Path:
+    """Return the path of a library, after compiling it there if what is there is not to be loaded."""
+    if _loads(path):
+        return path
+    there = is_there(path)
+    compiler.build(source, path)
+    if there:
+        _warn_once(f"libraries in {path.parent} are damaged or not this user's: they are compiled again")
+    if not _loads(path):
+        raise CompilerError(
+            "the compiled library does not load",
+            got=path,
+            needs="a folder from which libraries may be loaded, and a compiler for this processor",
+            try_="setting PASSIFLEX_CACHE to another folder (is this one noexec?)",
+        )
+    return path
 
 
 def _key(source: str, compiler: Compiler) -> str:
     parts = (source, compiler.identity, *compiler.flags, cs.__version__, platform.machine(), _processor())
-    return hashlib.sha256("\0".join(parts).encode()).hexdigest()
+    return hashlib.sha256(SEAL + "\0".join(parts).encode()).hexdigest()  # before, libraries had no seal
 
 
 @functools.cache
@@ -187,11 +180,36 @@ def _processor() -> str:
     return "\n".join(line for line in first.splitlines() if line.lower().startswith(kept))
 
 
+def _fallback_folder() -> Path:
+    """Return a private folder that lives as long as this process; another one, should it be removed meanwhile.
+
+    Raises
+    ------
+    CompilerError
+        If no temporary folder can be made.
+    """
+    try:
+        try:
+            return own_folder(_process_folder(os.getpid()))
+        except (OSError, DistrustError):
+            _process_folder.cache_clear()
+            return own_folder(_process_folder(os.getpid()))
+    except OSError as error:
+        raise CompilerError(
+            "there is no folder for compiled libraries", got=error, try_="setting PASSIFLEX_CACHE or TMPDIR"
+        ) from error
+
+
 @functools.cache
-def _process_folder() -> Path:
-    """Return a private folder that lives as long as this process."""
+def _process_folder(process: int) -> Path:
+    """Return a new folder of this process; a fork makes its own, and leaves that of its parent alone."""
     folder = tempfile.mkdtemp(prefix="passiflex-")
-    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+
+    def remove() -> None:
+        if os.getpid() == process:
+            shutil.rmtree(folder, ignore_errors=True)
+
+    atexit.register(remove)
     return Path(folder)
 
 

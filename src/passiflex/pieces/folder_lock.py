@@ -5,7 +5,7 @@ from __future__ import annotations
 import fcntl
 import os
 import socket
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -13,6 +13,8 @@ from passiflex.errors import PassiflexError
 from passiflex.files import OutputError
 
 NAME = ".lock"
+OWNER = b"process"
+"""How the file begins."""
 
 
 class FolderInUseError(PassiflexError):
@@ -20,8 +22,10 @@ class FolderInUseError(PassiflexError):
 
 
 @contextmanager
-def locked(folder: Path) -> Iterator[None]:
+def locked(folder: Path) -> Iterator[Callable[[], bool]]:
     """Hold the folder's lock; the operating system frees it when the process ends, however it ends.
+
+    Gives a function that says whether it is still the lock of a folder of this name: both may be removed.
 
     The file stays: were it removed, two processes could hold locks on two files of that name.
 
@@ -39,8 +43,9 @@ def locked(folder: Path) -> Iterator[None]:
     try:
         try:
             fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            os.ftruncate(handle, 0)
-            os.pwrite(handle, f"process {os.getpid()} on {socket.gethostname()}".encode(), 0)
+            if os.pread(handle, len(OWNER), 0) in (b"", OWNER):  # else the file is somebody's own
+                os.ftruncate(handle, 0)
+                os.pwrite(handle, OWNER + f" {os.getpid()} on {socket.gethostname()}".encode(), 0)
         except BlockingIOError:
             owner = os.pread(handle, 200, 0).decode(errors="replace") or "another process"
             raise FolderInUseError(
@@ -50,6 +55,13 @@ def locked(folder: Path) -> Iterator[None]:
             ) from None
         except OSError as error:
             raise OutputError(f"cannot lock {folder}", got=error.strerror) from error
-        yield
+        yield lambda: _is_at(handle, folder / NAME)
     finally:
         os.close(handle)
+
+
+def _is_at(handle: int, path: Path) -> bool:
+    try:
+        return os.path.samestat(os.fstat(handle), path.stat())
+    except OSError:
+        return False

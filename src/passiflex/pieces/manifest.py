@@ -2,28 +2,32 @@
 
 from __future__ import annotations
 
-import dataclasses
 import difflib
 import json
 import os
-from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from passiflex.errors import PassiflexError
-from passiflex.files import whole_file
+from passiflex.files import read_json, read_regular, whole_file
 from passiflex.pieces.source import source_digest
 
 FORMAT = "passiflex campaign 1"
 NAME = "manifest.json"
+MOST = 999_999_999
+"""Most samples, as the names of pieces have nine digits."""
+MOST_BYTES = 16_000_000
+Word = Annotated[str, Field(pattern=r"^[A-Za-z0-9_.+!-]+$", max_length=100)]
 
 
 class FolderError(PassiflexError):
     """A folder does not hold the campaign that is asked for, or what it holds is damaged."""
 
 
-@dataclass(frozen=True)
-class Manifest:
+class Manifest(BaseModel):
     """Of a campaign's folder.
 
     Attributes
@@ -35,22 +39,29 @@ class Manifest:
     source: Digest of the source that the rows come from.
     version, commit: Of the package, for the reader.
     started: When the first run was, UTC.
+    runs: Files of full runs that the campaign has written: what it may remove again.
     """
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
     campaign: str
     identity: str
-    samples: int
-    piece: int
-    source: str
-    version: str
-    commit: str
+    samples: Annotated[int, Field(ge=1, le=MOST)]
+    piece: Annotated[int, Field(ge=1, le=MOST)]
+    source: Word
+    version: Word
+    commit: Word
     started: str
     format: str = FORMAT
+    runs: list[Annotated[str, Field(pattern=r"^sample_\d+\.nc$")]] = []
 
     def save(self, folder: Path) -> None:
         """Write it, whole or not at all."""
-        with whole_file(folder / NAME) as temporary, temporary.open("w", encoding="utf-8") as file:
-            json.dump(dataclasses.asdict(self), file, indent=2, ensure_ascii=False)
+        with (
+            whole_file(folder / NAME, parents=False) as temporary,
+            temporary.open("w", encoding="utf-8") as file,
+        ):
+            json.dump(self.model_dump(), file, indent=2, ensure_ascii=False)
             file.flush()
             os.fsync(file.fileno())
 
@@ -84,7 +95,7 @@ class Manifest:
             raise FolderError(
                 "the folder holds rows of another campaign", got="; ".join(differs), try_="another folder"
             )
-        return dataclasses.replace(self, campaign=campaign, samples=samples)
+        return self.model_copy(update={"campaign": campaign, "samples": samples})
 
 
 def new_manifest(campaign: str, identity: str, samples: int, piece: int) -> Manifest:
@@ -93,7 +104,14 @@ def new_manifest(campaign: str, identity: str, samples: int, piece: int) -> Mani
 
     now = datetime.now(UTC).isoformat(timespec="seconds")
     return Manifest(
-        campaign, identity, samples, piece, source_digest(), package_version(), source_commit(), now
+        campaign=campaign,
+        identity=identity,
+        samples=samples,
+        piece=piece,
+        source=source_digest(),
+        version=package_version(),
+        commit=source_commit(),
+        started=now,
     )
 
 
@@ -105,16 +123,31 @@ def load_manifest(folder: Path) -> Manifest:
     FolderError
         If there is none, or it is damaged or of another format.
     """
+    path = folder / NAME
     try:
-        content = json.loads((folder / NAME).read_text(encoding="utf-8"))
-        found = content.get("format")
-        if found == FORMAT:
-            return Manifest(**content)
+        content = read_json(read_regular(path, MOST_BYTES).decode("utf-8"))
+        if not isinstance(content, dict):
+            raise ValueError("no mapping")
     except (FileNotFoundError, NotADirectoryError):
         raise FolderError(f"{folder} holds no campaign", got=f"no {NAME}") from None
-    except (OSError, ValueError, TypeError, AttributeError) as error:
-        raise FolderError(f"{folder / NAME} is damaged", got=error, try_="another folder") from error
-    raise FolderError(f"{folder} is of another version", got=repr(found), needs=repr(FORMAT))
+    except (OSError, ValueError) as error:
+        raise FolderError(f"{path} is damaged", got=error, try_="another folder") from error
+    if content.get("format") != FORMAT:
+        got = repr(content.get("format"))[:80]
+        raise FolderError(f"{folder} is of another version", got=got, needs=repr(FORMAT))
+    try:
+        return Manifest.model_validate(content)
+    except ValidationError as error:
+        got = _mistakes(error, content)
+        raise FolderError(f"{path} is damaged", got=got, try_="another folder") from error
+
+
+def _mistakes(error: ValidationError, content: dict[str, Any]) -> str:
+    """Return what is wrong, in the words that a scenario's mistakes have."""
+    from passiflex.texts.model_mistakes import explained  # slow to import: only where something is wrong
+    from passiflex.texts.yaml_tree import dotted
+
+    return "; ".join(f"{dotted(place)}: {said}" for place, said, _ in explained(error, content, Manifest))
 
 
 def _difference(before: str, now: str) -> str:

@@ -62,7 +62,7 @@ def run_pieces(
 ) -> Path:
     """Run the pieces that a store misses, and return the path of the file of all rows.
 
-    Whatever ends it early, Ctrl-C too, leaves the finished pieces in the store; rows are not collected here.
+    Whatever ends it early, Ctrl-C or SIGTERM, leaves the finished pieces in the store; rows are not collected here.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ def run_pieces(
                 return store.finish()
             for future in wait(running, return_when=FIRST_COMPLETED).done:
                 keep(future)
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, SystemExit):  # Ctrl-C, SIGTERM
         for future in [future for future in running if future.done()]:
             keep(future)
         raise

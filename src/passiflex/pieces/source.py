@@ -7,7 +7,7 @@ from functools import cache
 from pathlib import Path
 
 PACKAGE = Path(__file__).parents[1]
-WITHOUT_EFFECT = ("plotting", "studies", "cli")
+WITHOUT_EFFECT = ("views", "plotting", "reports", "exports", "studies", "cli")
 """Rooms that no row comes from: campaigns cannot import them."""
 
 

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import os
-import re
 from collections import Counter
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Collection, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import final
 
 import pyarrow as pa
 
 from passiflex.errors import ValueRangeError
-from passiflex.files import OutputError, require_writable, whole_file
+from passiflex.files import OutputError, is_half_written, require_writable, whole_file
 from passiflex.pieces.folder_lock import locked
 from passiflex.pieces.manifest import NAME, FolderError, Manifest, load_manifest, new_manifest
 from passiflex.pieces.piece import Rows, verdicts_in
@@ -22,6 +21,7 @@ from passiflex.pieces.stored_rows import (
     PIECES,
     DamagedError,
     Stored,
+    gaps,
     parts,
     piece_path,
     schema_of,
@@ -33,8 +33,6 @@ from passiflex.pieces.tables import unified
 
 PIECE = 32
 """Samples of a piece."""
-_HALF_WRITTEN = re.compile(r"\..+-[a-z0-9_]{8}(\.\w+)?")
-"""Names of the temporary files of `whole_file`; other hidden files, such as a .gitignore, are the user's."""
 
 
 @contextmanager
@@ -75,7 +73,7 @@ def open_store(
         )
     folder = Path(folder)
     require_writable(folder)
-    with locked(folder):
+    with locked(folder) as is_ours:
         identity = campaign if identity is None else identity
         if (folder / NAME).exists():
             before = load_manifest(folder)
@@ -89,7 +87,7 @@ def open_store(
         _sweep(folder)
         if manifest != before:
             manifest.save(folder)
-        yield Store(folder, manifest, piece)
+        yield Store(folder, manifest, piece, is_ours)
 
 
 @final
@@ -104,19 +102,14 @@ class Store:
     damaged: Files of pieces that were found broken and removed.
     """
 
-    def __init__(self, folder: Path, manifest: Manifest, piece: int):
-        self.folder, self.manifest, self._piece = folder, manifest, piece
-        self.done, self.verdicts = 0, Counter[str]()
+    def __init__(self, folder: Path, manifest: Manifest, piece: int, is_ours: Callable[[], bool]):
+        self.folder, self.manifest, self._piece, self._is_ours = folder, manifest, piece, is_ours
+        self.verdicts = Counter[str]()
         self.damaged: list[Path] = []
         self._schema: pa.Schema | None = None
-        self._gaps: list[range] = []
-        end = 0
-        for file in stored(folder):
-            if self._sound(file):
-                self._gaps.append(range(end, file.samples.start))
-                self.done += len(file.samples)
-                end = file.samples.stop
-        self._gaps.append(range(end, manifest.samples))
+        sound = [file for file in stored(folder) if self._sound(file)]
+        self.done = sum(len(file.samples) for file in sound)
+        self._gaps = list(gaps(sound, manifest.samples))
 
     @property
     def samples(self) -> int:
@@ -141,11 +134,15 @@ class Store:
             If its columns do not go with those of the other pieces.
         OutputError
             If it cannot be written; the pieces written before stay.
+        FolderError
+            If the folder was removed meanwhile.
         """
         schema = unified([self._schema, rows.schema] if self._schema else [rows.schema])
         path = piece_path(self.folder, samples)
         with self._saying_what_is_kept():
-            with whole_file(path) as temporary, temporary.open("wb") as file:
+            self._require_folder()
+            path.parent.mkdir(exist_ok=True)
+            with whole_file(path, parents=False) as temporary, temporary.open("wb") as file:
                 file.write(rows.parquet)
                 file.flush()
                 os.fsync(file.fileno())
@@ -155,23 +152,60 @@ class Store:
         self.verdicts.update(rows.verdicts)
 
     def finish(self) -> Path:
-        """Write the rows of all pieces into one file, sorted by sample, and return its path."""
-        if self.done != self.samples or self._schema is None:
+        """Write the rows of all pieces into one file, sorted by sample, and return its path.
+
+        Raises
+        ------
+        FolderError
+            If samples are missing, as those whose pieces were removed meanwhile: no other piece is touched then.
+        OutputError
+            If it cannot be written.
+        """
+        if self.done != self.samples:
             raise FolderError("the campaign is not complete", got=f"{self.done} of {self.samples} samples")
         with self._saying_what_is_kept():
-            path = write_all(self.folder, unified(schema_of(file) for file in stored(self.folder)))
-            folder = self.folder / PIECES
-            if folder.exists() and not any(folder.iterdir()):
-                folder.rmdir()
+            self._require_folder()
+            files = stored(self.folder)
+            if lost := sum(map(len, gaps(files, self.samples))):
+                self.done -= lost
+                raise self._gone()
+            path = write_all(self.folder, unified(schema_of(file) for file in files), self.samples)
+            with suppress(OSError):  # somebody else's files are in it
+                (self.folder / PIECES).rmdir()
         return path
+
+    def own_runs(self, names: Collection[str]) -> None:
+        """Note the files of full runs that the campaign may remove again: before the first of them is written."""
+        if sorted(names) != self.manifest.runs:
+            self.manifest = self.manifest.model_copy(update={"runs": sorted(names)})
+            self.manifest.save(self.folder)
+
+    def _require_folder(self) -> None:
+        """Raise FolderError if the folder was removed, or is another one by now; what is left in it stays usable."""
+        ours = self._is_ours()
+        if (ours or (self.folder / PIECES).exists()) and not (self.folder / NAME).exists():
+            self.manifest.save(self.folder)  # without it nobody could go on with the pieces
+        if not ours:
+            raise self._gone()
+
+    def _gone(self) -> FolderError:
+        return FolderError(
+            f"files of the campaign were removed from {self.folder} while it ran",
+            got=f"{self.done} of {self.samples} samples at most",
+            try_="the same again: only the missing ones are run",
+        )
 
     @contextmanager
     def _saying_what_is_kept(self) -> Iterator[None]:
         try:
             yield
         except OSError as error:
+            if isinstance(error, FileNotFoundError):
+                raise self._gone() from error
             raise self._unwritable(f"cannot write into {self.folder}", error.strerror or error) from error
         except OutputError as error:
+            if isinstance(error.__cause__, FileNotFoundError):
+                raise self._gone() from error
             raise self._unwritable(error.what, error.got) from error
 
     def _unwritable(self, what: str, reason: object) -> OutputError:
@@ -191,7 +225,7 @@ class Store:
         except DamagedError:
             if file.path.name == ALL:  # all the work, of which some can perhaps be saved: not ours to remove
                 raise
-            file.path.unlink()
+            file.path.unlink(missing_ok=True)
             self.damaged.append(file.path)
             return False
         self._schema = unified([self._schema, schema] if self._schema else [schema])
@@ -203,5 +237,5 @@ def _sweep(folder: Path) -> None:
     """Remove what killed processes left half-written: rows, and what is made of them in the same folder."""
     for inner in (folder, folder / PIECES, folder / "runs"):
         for left in inner.glob(".*"):
-            if _HALF_WRITTEN.fullmatch(left.name) and left.is_file():
+            if is_half_written(left) and left.is_file():
                 left.unlink(missing_ok=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import NamedTuple
 
@@ -26,7 +26,7 @@ GROUP = 8192
 """Most samples of a row group of the file of all: what is in memory while it is written, and what a reader skips."""
 GROUP_BYTES = 2**24
 """A row group ends with the row that fills so many bytes, as `_widths` counts them, if that comes first."""
-_PIECE = re.compile(r"(\d+)-(\d+)\.parquet")
+_PIECE = re.compile(r"(\d{9})-(\d{9})\.parquet")
 
 
 class Stored(NamedTuple):
@@ -50,9 +50,8 @@ def stored(folder: Path) -> list[Stored]:
     waiting = sorted(pieces(folder), key=lambda piece: piece.samples.start)
     path = folder / ALL  # looked for after the pieces, which are removed only when it is there
     found: list[Stored] = []
-    if path.exists():
-        with _noticing_damage(path), opened(path) as file:
-            found.append(Stored(path, range(file.metadata.num_rows)))
+    with suppress(FileNotFoundError), _noticing_damage(path), opened(path) as file:
+        found.append(Stored(path, range(file.metadata.num_rows)))
     end = found[0].samples.stop if found else 0
     for piece in waiting:
         if piece.samples.start >= end:  # else it was left behind when all had been written into one file
@@ -65,7 +64,7 @@ def pieces(folder: Path) -> list[Stored]:
     """Return the files of pieces, in any order."""
     found = []
     for path in (folder / PIECES).glob("*.parquet"):
-        if match := _PIECE.fullmatch(path.name):
+        if (match := _PIECE.fullmatch(path.name)) and match[1] < match[2]:
             found.append(Stored(path, range(int(match[1]), int(match[2]))))
     return found
 
@@ -119,10 +118,8 @@ def read_rows(folder: str | Path, columns: Sequence[str] | None = None) -> pa.Ta
             schema = _asked_for(files, columns)
             blocks = [conformed(part, schema) for file in files for part in parts(file, columns)]
             return pa.concat_tables([schema.empty_table(), *blocks])
-        except (FileNotFoundError, DamagedError):
-            if stored(folder) == files:
-                raise
-            # else all were written into one file meanwhile: once more
+        except (FileNotFoundError, DamagedError) as error:
+            _require_change(folder, files, error)  # all were written into one file: once more
 
 
 def read_blocks(folder: str | Path, columns: Sequence[str] | None = None) -> Iterator[pa.Table]:
@@ -151,30 +148,48 @@ def read_blocks(folder: str | Path, columns: Sequence[str] | None = None) -> Ite
                         given = rows[INDEX][-1].as_py() + 1
                         yield conformed(rows, schema)
             return
-        except (FileNotFoundError, DamagedError):
-            if stored(folder) == files:
-                raise
+        except (FileNotFoundError, DamagedError) as error:
+            _require_change(folder, files, error)
 
 
-def write_all(folder: Path, schema: pa.Schema) -> Path:
-    """Write the rows of all files into one, and remove the others.
+def write_all(folder: Path, schema: pa.Schema, samples: int) -> Path:
+    """Write the rows of all files into one, and remove the others once it has been read back.
 
     Its bytes depend on the rows alone: it is written anew, in row groups that end where the widths of the rows
     say, from the first sample on. What is in memory is one of them and a part of a file.
+
+    Raises
+    ------
+    DamagedError
+        If a file is damaged, the new one included.
     """
     path = folder / ALL
     files = stored(folder)
     if any(file.path != path for file in files):
-        with whole_file(path) as temporary, temporary.open("wb") as out:
-            with pq.ParquetWriter(out, schema, **WRITING) as writer:
-                for group in _groups(files, schema):
-                    writer.write_table(group, row_group_size=group.num_rows)
-            out.flush()
-            os.fsync(out.fileno())
+        with whole_file(path, parents=False) as temporary:
+            with temporary.open("wb") as out:
+                with pq.ParquetWriter(out, schema, **WRITING) as writer:
+                    for group in _groups(files, schema):
+                        writer.write_table(group, row_group_size=group.num_rows)
+                out.flush()
+                os.fsync(out.fileno())
+            for _ in parts(Stored(temporary, range(samples))):
+                pass  # it raises for what is not as it should be
         settle(folder)
     for piece in pieces(folder):
         piece.path.unlink(missing_ok=True)
     return path
+
+
+def gaps(files: Sequence[Stored], samples: int) -> Iterator[range]:
+    """Yield the samples that are in none of the files, which are in their order."""
+    end = 0
+    for file in files:
+        if file.samples.start > end:
+            yield range(end, file.samples.start)
+        end = file.samples.stop
+    if end < samples:
+        yield range(end, samples)
 
 
 def settle(folder: Path) -> None:
@@ -184,6 +199,15 @@ def settle(folder: Path) -> None:
         os.fsync(handle)
     finally:
         os.close(handle)
+
+
+def _require_change(folder: Path, files: list[Stored], error: Exception) -> None:
+    """Raise what went wrong with the files of a folder, unless it holds others by now."""
+    if stored(folder) != files:
+        return
+    if isinstance(error, FileNotFoundError):
+        raise FolderError(f"rows are gone from {folder}", got=f"no {error.filename}") from error
+    raise error
 
 
 def _asked_for(files: list[Stored], columns: Sequence[str] | None) -> pa.Schema:

@@ -10,7 +10,8 @@ from passiflex.campaigns.measures import MEASURES, measures
 from passiflex.errors import PassiflexError
 from passiflex.passivity import Audit, audit_if_possible
 from passiflex.responses.steps import step_window
-from passiflex.simulation import Run, resolve
+from passiflex.simulation import Run
+from passiflex.simulation.run_arm import problem_of
 from passiflex.simulation.witness import ROUND_OFF
 from passiflex.views.events import scenario_of
 
@@ -81,7 +82,7 @@ def _measured(run: Run) -> dict[str, float | str]:
         return {"end_time": float(run.time[-1])}
     scenario = scenario_of(run)
     try:
-        problem = None if scenario is None else resolve(scenario)
+        problem = None if scenario is None else problem_of(run, scenario)
         if (
             scenario is not None
             and problem is not None

@@ -16,8 +16,10 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from passiflex.errors import RunFileError
-from passiflex.files import whole_file
+from passiflex.files import read_json, whole_file
 from passiflex.layout import Field, Layout
+from passiflex.simulation.run_attributes import wrong_attributes, wrong_units
+from passiflex.simulation.run_bounds import require_bounded
 from passiflex.simulation.run_file import FORMAT, cut_short, defects, foreign, require_file, unreadable
 from passiflex.simulation.unbooked import UNKNOWN, unbooked
 from passiflex.simulation.witness import Noted
@@ -35,6 +37,8 @@ AXES = {
     "governed_rotation": ("axis", "column"),
     "held_stiffness": ("task_row", "task_column"),
 }
+JOINT_PARAMETERS = ("joint_stiffness", "joint_damping", "motor_inertia")
+"""Of the robot as described: with the arm's description they make it again, without its file."""
 COORDINATES = {
     "axis": ["x", "y", "z"],
     "column": ["x", "y", "z"],
@@ -83,7 +87,7 @@ class Run:
     @property
     def events(self) -> list[dict[str, Any]]:
         """Return what happened at single instants, as the jumps of the reference and what they cost."""
-        return list(json.loads(self.data.attrs["events"]))
+        return list(read_json(self.data.attrs["events"]))
 
     @property
     def time(self) -> NDArray[np.float64]:
@@ -133,11 +137,19 @@ class Run:
         path = Path(path)
         require_file(path)
         try:
+            require_bounded(path)
             data = xr.load_dataset(path, engine="h5netcdf")
+        except RunFileError:
+            raise
         except Exception as error:  # the readers raise many kinds for a file that is no netCDF
             raise unreadable(path, error) from error
         if data.attrs.get("format") != FORMAT:
             raise foreign(path, data)
+        if wrong := wrong_attributes(data.attrs):
+            got = "; ".join(f"{name}: {why}" for name, why in wrong.items())
+            raise RunFileError(f"{path} says what no run says", got=got)
+        if units := wrong_units(data):
+            raise RunFileError(f"{path} has signals whose units are no text", got=", ".join(units))
         missing, broken = defects(data)
         if missing or not data.sizes.get("time"):
             got = f"no {', '.join(missing)}" if missing else "no rows"
@@ -192,6 +204,7 @@ def assemble(
         "name": problem.name,
         "robot": robot.name,
         "robot_description": _description(problem),
+        "joint_parameters": json.dumps({name: getattr(robot, name).tolist() for name in JOINT_PARAMETERS}),
         "law": type(problem.law).__name__,
         "configuration": problem.configuration,
         "sources": json.dumps(robot.sources, ensure_ascii=False),

@@ -102,13 +102,17 @@ def require_file(path: Path) -> None:
     """Raise RunFileError unless there is a file."""
     if path.is_dir():
         raise RunFileError(f"{path} is a folder", needs="the file of a run")
+    if path.exists() and not path.is_file():
+        raise RunFileError(f"{path} is no regular file", needs="the file of a run")
     if not path.is_file():
         raise RunFileError(f"no such file: {path}", try_="passiflex simulate SCENARIO.yaml --out RUN.nc")
 
 
 def unreadable(path: Path, error: Exception) -> RunFileError:
     """Return what to say of a file that no reader can open: whether it is a netCDF file at all, or the rest is lost."""
-    if path.read_bytes()[: len(SIGNATURE)] != SIGNATURE:
+    with path.open("rb") as file:
+        begin = file.read(len(SIGNATURE))
+    if begin != SIGNATURE:
         scenario = path.suffix in (".yaml", ".yml")
         try_ = f"passiflex simulate {path} --out RUN.nc" if scenario else None
         return RunFileError(

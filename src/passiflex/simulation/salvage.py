@@ -10,6 +10,8 @@ import xarray as xr
 
 from passiflex.errors import RunFileError
 from passiflex.simulation.run import Run
+from passiflex.simulation.run_attributes import without_units, wrong_attributes, wrong_units
+from passiflex.simulation.run_bounds import require_bounded
 from passiflex.simulation.run_file import FORMAT, cut_short, foreign, remarks, require_file, unreadable
 from passiflex.simulation.sound import sound_signals
 
@@ -50,6 +52,7 @@ def salvage(path: str | Path) -> Salvaged:
     """
     path = Path(path)
     require_file(path)
+    _require_bounded(path)
     notices: list[str] = []
     data, in_file = _readable(path, notices)
     if not str(data.attrs.get("format", "")).startswith(f"{KIND} "):
@@ -76,6 +79,15 @@ def _lacking(data: xr.Dataset) -> str | None:
     return None if shown else f"none of {', '.join(SHOWN)}"
 
 
+def _require_bounded(path: Path) -> None:
+    try:
+        require_bounded(path)
+    except RunFileError:
+        raise
+    except Exception as error:
+        raise unreadable(path, error) from error
+
+
 def _readable(path: Path, notices: list[str]) -> tuple[xr.Dataset, list[str]]:
     """Return the variables that can be read, one by one, as damage in one leaves the others; and the names of all."""
     try:
@@ -95,19 +107,21 @@ def _readable(path: Path, notices: list[str]) -> tuple[xr.Dataset, list[str]]:
 
 
 def _with_attributes(data: xr.Dataset, notices: list[str]) -> xr.Dataset:
+    """Return the run with attributes that a run can have, and units that are text."""
+    wrong = wrong_attributes(data.attrs)
     defaults = DEFAULTS | {"has_tank": int("tank_energy" in data)}
-    absent = {name: value for name, value in defaults.items() if not _is_like(data.attrs.get(name), value)}
+    absent = {name: value for name, value in defaults.items() if name not in data.attrs or name in wrong}
+    left_out = [name for name in wrong if name not in absent]
     if absent:
         notices.append(f"The file does not say its {', '.join(absent)}.")
-    return data.assign_attrs(absent)
-
-
-def _is_like(value: Any, default: Any) -> bool:
-    """Return whether an attribute can stand in place of a default: text, or a number in [0, ∞)."""
-    if isinstance(default, str):
-        return isinstance(value, str)
-    real = isinstance(value, int | float | np.integer | np.floating)
-    return real and bool(0 <= value < np.inf)
+    if left_out:
+        notices.append(f"Left out, as no run says it: {', '.join(left_out)}.")
+    if units := wrong_units(data):
+        notices.append(f"Signals whose units are no text: {', '.join(units)}.")
+        data = without_units(data, units)
+    data = data.assign_attrs(absent)
+    data.attrs = {name: value for name, value in data.attrs.items() if name not in left_out}
+    return data
 
 
 def _with_seconds(path: Path, data: xr.Dataset) -> xr.Dataset:

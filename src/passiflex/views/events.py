@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -19,9 +21,15 @@ APART = 0.05
 
 def scenario_of(run: Run) -> Scenario | None:
     """Return the scenario that a run carries as its resolved configuration; None if it cannot be read."""
+    return _parsed(str(run.data.attrs.get("configuration", "")))
+
+
+@lru_cache(maxsize=8)
+def _parsed(text: str) -> Scenario | None:
+    """Return the scenario of a text, which is asked for again and again; None if it is none."""
     try:
-        return parse_scenario(str(run.data.attrs["configuration"]), source="the run's configuration")
-    except (KeyError, ScenarioError):
+        return parse_scenario(text, source="the run's configuration")
+    except ScenarioError:
         return None
 
 

@@ -8,8 +8,8 @@ from passiflex.errors import PassiflexError
 from passiflex.responses.closed_form import ideal_displacement
 from passiflex.simulation.gains import target_inertia
 from passiflex.simulation.motion import Pose
-from passiflex.simulation.resolve import resolve
 from passiflex.simulation.run import Run
+from passiflex.simulation.run_arm import problem_of
 from passiflex.simulation.scenario import Scenario
 from passiflex.simulation.timeline import timeline
 from passiflex.views.events import scenario_of
@@ -32,7 +32,7 @@ def ideal_motion(run: Run) -> Array | None:
         return None
     if scenario.law.stiffness.free:
         return None
-    gains = _gains(scenario)
+    gains = _gains(run, scenario)
     if gains is None:
         return None
     stiffness, damping = gains
@@ -46,14 +46,16 @@ def ideal_motion(run: Run) -> Array | None:
     return np.column_stack([np.interp(run.time, grid, moved[:, i]) for i in range(3)])
 
 
-def _gains(scenario: Scenario) -> tuple[Array, Array] | None:
+def _gains(run: Run, scenario: Scenario) -> tuple[Array, Array] | None:
     """Return K_x and D_x; a damping that is given by its ratio is that of the robot at its start."""
     law = scenario.law
     if law.damping.ratio is None:
         return law.stiffness.full(), law.damping.full()
     try:
-        problem = resolve(scenario)
+        problem = problem_of(run, scenario)
     except PassiflexError:
+        return None
+    if problem is None:
         return None
     gains = problem.law.layout.unpack(problem.gains)
     return gains["stiffness"], gains["damping"]
