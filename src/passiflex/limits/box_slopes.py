@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Gains = Mapping[str, Array]
 
-FOLLOWED, SLOW, LEADING, DOMINANT = 12, 4, 3, 2
+FOLLOWED, SLOW, LEADING, DOMINANT = 16, 4, 10, 2
 """Modes that tremble and slower ones whose slopes are taken, those of the first that are followed to corners, and
 those that are followed uphill."""
 STEP = 1e-3

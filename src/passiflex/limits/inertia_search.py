@@ -94,10 +94,16 @@ class InertiaSearch:
                 )
             self.floor = self.ratio.copy()  # from now on it is only raised, so that the rounds come to an end
             self.worst = Worst(0.0, self.box.centre(0))
-            failing = [p for p in places if not self._passes(p, thorough=thorough)]
+            failing = []
+            for place in places:
+                if not self._passes(place, thorough=thorough):
+                    failing.append(place)
+                    if thorough:
+                        break
             if not failing and thorough:
                 return
-            # Where it failed it is tried again, quickly; once nothing fails there, thoroughly everywhere.
+            # Where it failed it is tried again, quickly; once nothing fails, thoroughly everywhere, and there first.
+            everywhere.sort(key=lambda place: place not in failing)
             places, thorough = failing or everywhere, not failing
         raise UnattainableError(
             "no B_e holds with this margin", got=f"{ROUNDS} searches that still found members"

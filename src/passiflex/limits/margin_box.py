@@ -35,11 +35,11 @@ FIELDS = {
 """What can be off, joint by joint, and the numbers of the robot that go with it."""
 NEAR = 0.3
 """How far from a posture of the set each joint may be [rad, m]."""
-STARTS, CLIMBS, SHARES = (1, 2), (2, 5), (1.0, 0.4, 0.15, 0.0)
-"""From how many members a quick and a thorough search go uphill, how many steps, and the shares of the coordinates
-that a step moves."""
-DRAWN, SEED = 16, 20
-"""Random members of each posture, and the seed of them."""
+STARTS, CLIMBS, SHARES = 3, (2, 5), (1.0, 0.4, 0.15, 0.0)
+"""From how many members a thorough search goes uphill, how many steps a quick and a thorough one go, and the shares of
+the coordinates that a step moves."""
+DRAWN, BASES, SEED = 24, 5, 20
+"""Random members of each posture, places beside it from which slopes are followed, and the seed of both."""
 SETTLING = 0.5
 """[1/s] Whatever trembles must die out at least this fast."""
 
@@ -100,6 +100,14 @@ class MarginBox:
         """Return the nominal robot at each posture."""
         return tuple(self.centre(i) for i in range(len(self.problems)))
 
+    def bases(self, posture: int) -> Iterator[Member]:
+        """Yield the nominal robot at a posture, and at some beside it: slopes of one do not tell of all the others."""
+        rng = np.random.default_rng([SEED, posture])
+        yield self.centre(posture)
+        for _ in range(BASES if self.margin else 0):
+            beside = rng.choice([-1.0, 1.0], self.n)
+            yield Member(posture, (*(0.0,) * (4 * self.n + 1), *beside.tolist()))
+
     def corners(self, posture: int) -> Iterator[Member]:
         """Yield the corners that are common to all joints, at the posture itself."""
         if self.margin == 0:
@@ -139,13 +147,15 @@ class MarginBox:
 
     def search(self, gains: Gains, posture: int, *, thorough: bool = True) -> Worst:
         """Return the worst member that is found at a posture; thorough: with all common corners and random members."""
-        centre = self.centre(posture)
-        tried = [centre, *(self._uphill(centre, s) for s in steepest(self, centre, gains))]
-        tried += [*self.corners(posture), *self.drawn(posture, DRAWN)] if thorough else []
+        tried = []
+        for base in self.bases(posture) if thorough else (self.centre(posture),):
+            tried += [base, *(self._uphill(base, slope) for slope in steepest(self, base, gains))]
+        if not thorough:
+            return self._climbed(self.worst(gains, tried), gains, CLIMBS[False])
+        tried += [*self.corners(posture), *self.drawn(posture, DRAWN)]
         found = sorted((Worst(self.radius(m, gains), m) for m in tried), reverse=True)
-        starts, steps = STARTS[thorough], CLIMBS[thorough]
-        best = max(self._climbed(start, gains, steps) for start in found[:starts])
-        return self._turned(best, gains) if thorough else best
+        best = max(self._climbed(start, gains, CLIMBS[True]) for start in found[:STARTS])
+        return self._turned(best, gains)
 
     def _climbed(self, found: Worst, gains: Gains, steps: int) -> Worst:
         """Return the worst member on the way uphill from one: to corners that slopes point to, or part of the way."""

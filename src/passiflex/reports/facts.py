@@ -70,6 +70,8 @@ def shown_configuration(run: Run) -> str:
     try:
         robot = tree.read(text, "a configuration names a robot").get("robot")
     except RefusedText:
+        if "robot" not in text:
+            return text
         return re.sub(r"(?<![^\s'\"])[^\s'\"]*[/\\]", "", text)  # nobody can say which of it is the path
     name = re.split(r"[/\\]", robot)[-1] if isinstance(robot, str) else robot
     if name == robot:
