@@ -27,8 +27,8 @@ help: ## list the targets
 reproduce: $(VENV)/.run-stamp ## make every figure and table of the paper, into results/
 	$(BIN)/passiflex reproduce --out results $(ARGS)
 
-test: $(VENV)/.dev-stamp ## run the tests, without the slow ones
-	$(BIN)/python -m pytest -m "not slow" $(PYTEST_ARGS) $(ARGS)
+test: $(VENV)/.dev-stamp ## run the tests, without the slow ones, on all cores
+	$(BIN)/python -m pytest -m "not slow" -n auto --dist loadfile $(PYTEST_ARGS) $(ARGS)
 
 test-slow: $(VENV)/.dev-stamp ## run the slow tests only
 	$(BIN)/python -m pytest -m slow $(PYTEST_ARGS) $(ARGS)
@@ -37,6 +37,7 @@ check: $(VENV)/.dev-stamp $(WEB_PACKAGES) ## lint, formatting and types; types a
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
+	$(BIN)/vermin --quiet --no-tips --violations --target=3.11- --backport typing_extensions src tests benchmarks hatch_build.py
 	$(BIN)/python hatch_build.py npm run check
 	$(BIN)/python hatch_build.py npm test
 
