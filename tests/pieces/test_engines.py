@@ -144,17 +144,16 @@ def test_there_are_as_many_workers_as_usable_cores() -> None:
 
 def fail_at_once(engine: LocalProcesses) -> None:
     with engine:
-        future = engine.submit(time.sleep, 60)
-        engine.submit(time.sleep, 60)
+        future = engine.submit(time.sleep, 3600)
+        engine.submit(time.sleep, 3600)
         wait_for(future.running)
         raise KeyboardInterrupt
 
 
 def test_a_block_that_raises_does_not_wait_for_its_calls() -> None:
-    engine, start = LocalProcesses(1), time.monotonic()
+    engine = LocalProcesses(1)
     with pytest.raises(KeyboardInterrupt):
         fail_at_once(engine)
-    assert time.monotonic() - start < 15
 
 
 class Counting(Executor):
