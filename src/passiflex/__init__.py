@@ -15,6 +15,8 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING
 
+from passiflex.version import __version__ as __version__
+
 if TYPE_CHECKING:
     from passiflex.campaigns import load_campaign as load_campaign
     from passiflex.campaigns import replay as replay
