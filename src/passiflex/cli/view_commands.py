@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 import cyclopts
 
-from passiflex.cli.terminal import app, console, timed
+from passiflex.cli.terminal import console, timed
 from passiflex.simulation.salvage import Salvaged
 
 Compared = Annotated[
@@ -20,7 +20,6 @@ Compared = Annotated[
 DRAWN = (".png", ".pdf", ".svg")
 
 
-@app.command
 def show(
     run: Path,
     *,
@@ -49,7 +48,6 @@ def show(
     return 0
 
 
-@app.command
 def plot(
     run: Path,
     *,
@@ -77,7 +75,6 @@ def plot(
     return 0
 
 
-@app.command
 def export(
     run: Path,
     *,
