@@ -12,9 +12,9 @@ The rooms, in the order in which they may import each other: `robots`, `phs`, `c
 
 from __future__ import annotations
 
-from importlib import import_module
 from typing import TYPE_CHECKING
 
+from passiflex.lazy import lazy_names
 from passiflex.version import __version__ as __version__
 
 if TYPE_CHECKING:
@@ -61,14 +61,4 @@ _ROOMS = {
 }
 
 
-def __getattr__(name: str) -> object:
-    """Import a name from its room when it is first used: `import passiflex` itself stays quick."""
-    if name not in _ROOMS:
-        raise AttributeError(f"module 'passiflex' has no attribute {name!r}")
-    value = getattr(import_module(f"passiflex.{_ROOMS[name]}"), name)
-    globals()[name] = value
-    return value
-
-
-def __dir__() -> list[str]:
-    return sorted([*globals(), *_ROOMS])
+__getattr__, __dir__ = lazy_names("passiflex", _ROOMS)

@@ -7,8 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import cyclopts
-from rich.table import Table
-from rich.text import Text
 
 from passiflex.cli.terminal import console, progress_lines, timed
 
@@ -60,15 +58,17 @@ def simulate(
 ) -> int:
     """Run a scenario file and write the run as one netCDF file; exit status 2 if the run ended early."""
     from passiflex.files import require_writable
-    from passiflex.simulation import load_scenario, resolve, simulate_problem
-    from passiflex.simulation.cautions import cautions
-    from passiflex.simulation.passed_limits import passed_limits
+    from passiflex.simulation import load_scenario
 
     with timed():
         with progress_lines() as report:
             _refuse_target(scenario, out)
             read = load_scenario(scenario)
             require_writable(out.parent)
+
+            from passiflex.simulation import passed_limits, resolve, simulate_problem
+            from passiflex.simulation.cautions import cautions
+
             problem = resolve(read)
             for caution in cautions(problem):
                 console.print(f"note: {caution}")
@@ -86,8 +86,10 @@ def simulate(
 
 def audit(run: Path) -> int:
     """Audit a run: exit status 0 passive, 1 violated, 2 inconclusive or not usable."""
+    from rich.table import Table
+
     from passiflex.passivity import audit as audit_run
-    from passiflex.simulation.passed_limits import passed_limits
+    from passiflex.simulation.passed_limit import passed_limits
     from passiflex.simulation.run import Run
     from passiflex.simulation.run_file import remarks
 
@@ -123,6 +125,8 @@ def audit(run: Path) -> int:
 
 def robots() -> int:
     """List the robots of the catalogue, and where their numbers come from."""
+    from rich.text import Text
+
     from passiflex.robots.catalogue import catalogue, read_description
 
     for name in catalogue():

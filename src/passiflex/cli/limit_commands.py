@@ -81,7 +81,7 @@ def recommend(
     """Find gains that hold with a margin, for a robot of the catalogue or a robot file: sections of a scenario."""
     from passiflex.limits import recommend as recommend_robot
     from passiflex.limits.subject import number
-    from passiflex.simulation.quantity import Quantity
+    from passiflex.texts.quantity import Quantity
 
     with timed():
         share = number("margin", margin, Quantity("1", least=0))

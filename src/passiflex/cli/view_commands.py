@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 import cyclopts
 
 from passiflex.cli.terminal import console, timed
-from passiflex.simulation.salvage import Salvaged
+from passiflex.simulation.salvaged import Salvaged
 
 Compared = Annotated[
     tuple[Path, ...],
@@ -98,7 +98,7 @@ def export(
 
 def _read(*paths: Path) -> list[Salvaged]:
     """Return what can be read of each file, after a line on everything that is wrong with it."""
-    from passiflex.simulation.salvage import salvage
+    from passiflex.simulation.salvaged import salvage
 
     read = [salvage(path) for path in paths]
     for path, (_, notices) in zip(paths, read, strict=True):

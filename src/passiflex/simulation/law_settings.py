@@ -19,7 +19,7 @@ Positive = Annotated[float, Quantity("1", above=0)]
 
 def _definite(matrix: Matrix) -> Matrix:
     """Return a matrix that is symmetric and positive definite."""
-    from passiflex.control.damping_design import require_positive_definite
+    from passiflex.control.definite import require_positive_definite
 
     try:
         require_positive_definite("the matrix", np.array(matrix))
