@@ -18,8 +18,10 @@ import passiflex
 from cli.shell import Shell
 from passiflex.cli import application
 from passiflex.cli.command_table import EXAMPLES, GROUPS
+from worlds import PLANAR
 
 COMMANDS = list(chain.from_iterable(GROUPS.values()))
+LARGE = {"adam", "casadi", "h5py", "matplotlib", "pandas", "pint", "pyarrow", "scipy", "xarray"}
 ROOT = Path(__file__).parents[2]
 
 
@@ -48,6 +50,31 @@ def test_the_front_imports_little_and_nothing_that_is_installed(arguments: tuple
     added = {name.split(".")[0] for name in modules_of(*arguments) - bare}
     assert added - sys.stdlib_module_names == {"passiflex"}
     assert len(modules_of(*arguments) - bare) < 40
+
+
+def test_commands_import_nothing_large_before_they_do_something() -> None:
+    places = sorted({command.place.partition(":")[0] for command in COMMANDS})
+    imported = {name.split(".")[0] for name in modules_after(f"import {', '.join(places)}")}
+    assert "cyclopts" in imported
+    assert imported.isdisjoint({*LARGE, "numpy", "pydantic", "yaml"})
+
+
+@pytest.mark.parametrize(
+    ("unit", "needed"),
+    [("", {"numpy", "pydantic", "yaml"}), (" cm", {"pint"})],
+    ids=["plain numbers", "units"],
+)
+def test_a_mistake_in_a_scenario_is_told_before_anything_else_is_imported(
+    unit: str, needed: set[str], tmp_path: Path
+) -> None:
+    path = tmp_path / "wrong.yaml"
+    path.write_text(PLANAR.replace("[0, 0, 0.05]", f"[0{unit}, 0{unit}, 5{unit}]") + "durration: 3\n")
+    imported = modules_of("simulate", str(path), "--out", str(tmp_path / "run.nc"))
+    assert "passiflex.simulation.scenario" in imported
+    packages = {name.split(".")[0] for name in imported}
+    assert needed <= packages
+    assert packages.isdisjoint(LARGE - {"pint", "scipy"})  # with units they are pint's
+    assert unit or packages.isdisjoint(LARGE)
 
 
 def test_a_command_imports_neither_the_others_nor_what_they_need() -> None:

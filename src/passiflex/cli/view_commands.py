@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import cyclopts
 
 from passiflex.cli.terminal import console, timed
-from passiflex.simulation.salvaged import Salvaged
+
+if TYPE_CHECKING:
+    from passiflex.simulation.salvaged import Salvaged
 
 Compared = Annotated[
     tuple[Path, ...],
