@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from passiflex.errors import ValueRangeError
-from passiflex.simulation import Problem, Scenario, load_scenario, parse_scenario, resolve
+from passiflex.simulation import Problem, Scenario, parse_scenario, resolve
 from passiflex.simulation.altered import HIGHEST_RATE, altered, at_rate
+from passiflex.simulation.scenario_file import as_scenario
 from passiflex.texts.quantity import Quantity
 
-Subject = Problem | Scenario | str | Path
-"""A problem, a scenario, or the path of a scenario file."""
+Subject = Problem | Scenario | Mapping[str, Any] | str | Path
+"""A problem, a scenario, a mapping with the entries of a scenario file, or the path of one."""
 
 RATE = Quantity("Hz", above=0, most=HIGHEST_RATE)
 DELAY = Quantity("s", least=0)
@@ -36,8 +39,7 @@ def sampled_problem(
         if subject.sampling is not None:
             return altered(subject, rate=hertz, delay=late)
         return resolve(at_rate(parse_scenario(subject.configuration), hertz, late), subject.law.robot)
-    scenario = subject if isinstance(subject, Scenario) else load_scenario(subject)
-    return resolve(at_rate(scenario, hertz, late))
+    return resolve(at_rate(as_scenario(subject), hertz, late))
 
 
 def number(name: str, written: float | str, quantity: Quantity) -> float:

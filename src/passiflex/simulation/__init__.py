@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from passiflex.lazy import lazy_names
 
@@ -41,8 +42,8 @@ _HOMES = {
 __getattr__, __dir__ = lazy_names("passiflex.simulation", _HOMES)
 
 
-def simulate(scenario: Scenario | str | Path) -> Run:
-    """Return the run of a scenario, or of the scenario file at a path.
+def simulate(scenario: Scenario | Mapping[str, Any] | str | Path) -> Run:
+    """Return the run of a scenario, of a mapping with the entries of a scenario file, or of the file at a path.
 
     A run that leaves the finite numbers is a result too; it ends there, and `Run.failure` says why.
 
@@ -52,8 +53,7 @@ def simulate(scenario: Scenario | str | Path) -> Run:
         If the scenario has mistakes or does not fit its robot.
     """
     from passiflex.simulation.resolution import resolve
-    from passiflex.simulation.scenario import Scenario
-    from passiflex.simulation.scenario_file import load_scenario
+    from passiflex.simulation.scenario_file import as_scenario
     from passiflex.simulation.through_time import simulate_problem
 
-    return simulate_problem(resolve(scenario if isinstance(scenario, Scenario) else load_scenario(scenario)))
+    return simulate_problem(resolve(as_scenario(scenario)))

@@ -133,10 +133,14 @@ class TankSettings(Section):
             raise Mistakes((("kind",), what))
 
     def completed(self, kind: Literal["paper", "port"]) -> Self:
-        """Return the settings with `kind` and the accounting that goes with it, where they were left out."""
+        """Return the settings with `kind` and the accounting that goes with it, where they were left out.
+
+        They still count as left out: with another kind they become its own.
+        """
         given = self.model_dump(exclude_unset=True, exclude_none=True)
         defaults = PORT_DEFAULTS if given.get("kind", kind) == "port" else PAPER_DEFAULTS
-        return type(self).model_validate({"kind": kind} | defaults | given)
+        made = type(self).model_validate({"kind": kind} | defaults | given)
+        return type(self).model_construct(set(given), **dict(made))
 
     @property
     def signed(self) -> bool:
