@@ -26,9 +26,11 @@ if TYPE_CHECKING:
     from passiflex.limits import check as check
     from passiflex.limits import limit_map as limit_map
     from passiflex.limits import recommend as recommend
+    from passiflex.limits import recommend_for as recommend_for
     from passiflex.passivity import Audit as Audit
     from passiflex.passivity import audit as audit
     from passiflex.phs import PortHamiltonianSystem as PortHamiltonianSystem
+    from passiflex.reports import show as show
     from passiflex.robots import FlexibleJointRobot as FlexibleJointRobot
     from passiflex.robots import catalogue as catalogue
     from passiflex.simulation import Run as Run
@@ -53,10 +55,12 @@ _ROOMS = {
     "load_campaign": "campaigns",
     "load_scenario": "simulation",
     "recommend": "limits",
+    "recommend_for": "limits",
     "replay": "campaigns",
     "run_campaign": "campaigns",
     "salvage": "simulation",
     "shipped_scenario": "studies",
+    "show": "reports",
     "simulate": "simulation",
 }
 

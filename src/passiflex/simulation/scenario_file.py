@@ -55,6 +55,14 @@ def as_scenario(given: Scenario | Mapping[str, Any] | str | Path) -> Scenario:
         raise ScenarioError("scenario", told(error, data, Scenario)) from None
 
 
+def is_scenario(path: str | Path) -> bool:
+    """Return whether a file has a law, as every scenario has and no robot file; False if it cannot be read."""
+    try:
+        return "law" in Tree().read(read_text(Path(path)), A_SCENARIO)
+    except (RefusedText, ScenarioError):
+        return False
+
+
 def read_text(path: Path) -> str:
     """Return the text of a scenario or campaign file.
 
