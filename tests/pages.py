@@ -27,7 +27,7 @@ EXAMPLES = ROOT / "docs" / "examples"
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 FENCE = re.compile(r"^```(\S*)[^\n]*\n(.*?)^```", re.MULTILINE | re.DOTALL)
 MARK = re.compile(r"<!-- no-run(?:: (?P<reason>\w[^>]*?))? -->\n*\Z")
-SLOW = re.compile(r"^passiflex (reproduce|search|limits)\b|--scheduler", re.MULTILINE)
+SLOW = re.compile(r"^passiflex (reproduce|search|limits|recommend)\b|--scheduler", re.MULTILINE)
 EXTRA = re.compile(r"passiflex\[(\w+)\]")
 ELLIPSIS = "…"
 

@@ -9,7 +9,7 @@ import pytest
 SOURCE = Path(__file__).parents[1] / "src" / "passiflex"
 MODULES = sorted(SOURCE.rglob("*.py"))
 
-FOUNDATION = ("errors", "layout", "files")
+FOUNDATION = ("version", "lazy", "errors", "layout", "files")
 ROOMS = (
     *FOUNDATION,
     "texts",

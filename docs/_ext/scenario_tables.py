@@ -17,10 +17,9 @@ from pydantic.fields import FieldInfo
 from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
-from passiflex.control.tank import EnergyTank
-from passiflex.sampled.tanks import TANKS
 from passiflex.simulation.scenario import Scenario
 from passiflex.simulation.tank_settings import TankSettings
+from passiflex.simulation.tank_uses import CONTINUOUS, SAMPLED, Uses
 from passiflex.texts.quantity import Quantity
 
 COLUMNS = (("key", 22), ("write", 30), ("default", 12), ("meaning", 36))
@@ -115,11 +114,11 @@ class ScenarioTable(SphinxDirective):
 
 
 class TankTable(SphinxDirective):
-    """`tank-table::`, which kind of tank goes by which of its settings, read from the tanks."""
+    """`tank-table::`, which kind of tank goes by which of its settings, read from the code."""
 
     def run(self) -> list[nodes.Node]:
         """Return the table."""
-        kinds = {"paper, in continuous time": EnergyTank} | dict(TANKS)
+        kinds = {"paper, in continuous time": CONTINUOUS} | SAMPLED
         names = [n for n in TankSettings.model_fields if n not in ("kind", "initial")]
         table, group = nodes.table(classes=["scenario"]), nodes.tgroup(cols=len(kinds) + 1)
         group += [nodes.colspec(colwidth=1) for _ in range(len(kinds) + 1)]
@@ -132,8 +131,8 @@ class TankTable(SphinxDirective):
         return [table]
 
 
-def _used(tank: Any, name: str) -> str:
-    return "yes" if name in tank.uses else "yes (v)" if name in getattr(tank, "gates", ()) else "–"
+def _used(uses: Uses, name: str) -> str:
+    return "yes" if name in uses.always else "yes (v)" if name in uses.gates else "–"
 
 
 def _row(cells: list[nodes.Node]) -> nodes.row:

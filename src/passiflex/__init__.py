@@ -12,8 +12,10 @@ The rooms, in the order in which they may import each other: `robots`, `phs`, `c
 
 from __future__ import annotations
 
-from importlib import import_module
 from typing import TYPE_CHECKING
+
+from passiflex.lazy import lazy_names
+from passiflex.version import __version__ as __version__
 
 if TYPE_CHECKING:
     from passiflex.campaigns import load_campaign as load_campaign
@@ -24,9 +26,11 @@ if TYPE_CHECKING:
     from passiflex.limits import check as check
     from passiflex.limits import limit_map as limit_map
     from passiflex.limits import recommend as recommend
+    from passiflex.limits import recommend_for as recommend_for
     from passiflex.passivity import Audit as Audit
     from passiflex.passivity import audit as audit
     from passiflex.phs import PortHamiltonianSystem as PortHamiltonianSystem
+    from passiflex.reports import show as show
     from passiflex.robots import FlexibleJointRobot as FlexibleJointRobot
     from passiflex.robots import catalogue as catalogue
     from passiflex.simulation import Run as Run
@@ -51,22 +55,14 @@ _ROOMS = {
     "load_campaign": "campaigns",
     "load_scenario": "simulation",
     "recommend": "limits",
+    "recommend_for": "limits",
     "replay": "campaigns",
     "run_campaign": "campaigns",
     "salvage": "simulation",
     "shipped_scenario": "studies",
+    "show": "reports",
     "simulate": "simulation",
 }
 
 
-def __getattr__(name: str) -> object:
-    """Import a name from its room when it is first used: `import passiflex` itself stays quick."""
-    if name not in _ROOMS:
-        raise AttributeError(f"module 'passiflex' has no attribute {name!r}")
-    value = getattr(import_module(f"passiflex.{_ROOMS[name]}"), name)
-    globals()[name] = value
-    return value
-
-
-def __dir__() -> list[str]:
-    return sorted([*globals(), *_ROOMS])
+__getattr__, __dir__ = lazy_names("passiflex", _ROOMS)

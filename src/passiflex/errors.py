@@ -71,6 +71,13 @@ class ScenarioError(PassiflexError):
         )
 
 
+class FrozenError(PassiflexError):
+    """A value was to be changed in place; a changed copy is what to make."""
+
+    def __init__(self, kind: str, got: str, try_: str):
+        super().__init__(f"{kind} is frozen", got=got, needs="a changed copy", try_=try_)
+
+
 class SimulationError(PassiflexError):
     """A run cannot be started, or left the finite numbers."""
 

@@ -276,15 +276,6 @@ def test_robots_lists_the_catalogue_with_its_sources(shell: Shell) -> None:
     assert "quoted in orocos_kdl, solvertest.cpp [2nd]" in result.out
 
 
-@pytest.mark.parametrize("arguments", [["--help"], ["-h"], []])
-def test_help_names_every_command(shell: Shell, arguments: list[str]) -> None:
-    result = shell(*arguments)
-    assert result.status == 0
-    assert result.err == ""
-    for command in ("reproduce", "simulate", "audit", "robots"):
-        assert re.search(rf"│ {command} +\w", result.out), command
-
-
 @pytest.mark.parametrize(
     ("command", "words"),
     [
@@ -304,7 +295,6 @@ def test_every_command_has_help(shell: Shell, command: str, words: list[str]) ->
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["simulat"], 'Unknown command "simulat".'),
         (["audit", "--loud", "run.nc"], "Unknown option: --loud."),
         (["audit"], 'Command "audit" parameter --run requires an argument.'),
         (["simulate", "s.yaml"], 'Command "simulate" parameter --out requires an argument.'),

@@ -1,14 +1,17 @@
-"""`passiflex limits`: the sentence, tables and files; exit status 0 for stable, 1 for unstable, 2 for mistakes."""
+"""`passiflex limits` and `recommend`: sentence, tables, files; status 0 for stable, 1 for unstable, 2 for mistakes."""
 
 from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Any
 
 import pytest
 import yaml
 
+import passiflex.limits
 from cli.shell import Result, Shell
+from passiflex.errors import ValueRangeError
 from passiflex.limits import check
 from passiflex.simulation import load_scenario
 from worlds import PLAIN, merged
@@ -75,6 +78,91 @@ def test_a_recommendation_can_be_pasted(
     pasted = tmp_path / "pasted.yaml"
     pasted.write_text(yaml.safe_dump(yaml.safe_load(scenario.read_text()) | snippet))
     assert check(load_scenario(pasted)).stable
+
+
+def test_a_recommendation_for_a_robot_alone_can_be_pasted(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, scenario: Path, tmp_path: Path
+) -> None:
+    """Into a scenario of that robot, whose own sections it stands for."""
+    words = [
+        "planar2r",
+        "--rate",
+        "1 kHz",
+        "--margin",
+        "10 %",
+        "--task",
+        "position",
+        "--inner-loop",
+        "matched",
+    ]
+    result = Shell(monkeypatch, capsys)("recommend", *words)
+    assert (result.status, result.err) == (0, "")
+    assert re.search(
+        r"^recommended: planar2r at 1 kHz with no delay: .* the matched inner loop$", result.out, re.M
+    )
+    assert "each joint off by up to 10 % and the delay by 0.1 periods" in result.out
+    snippet = yaml.safe_load(result.out[result.out.index("law:\n") : result.out.index("\ntook")])
+    assert snippet["control"]["inner_loop"] == "matched"
+    pasted = tmp_path / "pasted.yaml"
+    pasted.write_text(yaml.safe_dump(yaml.safe_load(scenario.read_text()) | snippet))
+    assert check(load_scenario(pasted)).stable
+
+
+def test_a_scenario_is_asked_for_with_what_the_command_was_told(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, scenario: Path
+) -> None:
+    """By `recommend` and by `limits --recommend` alike; the task of the latter is in the problem."""
+    told: list[tuple[tuple[Any, ...], dict[str, Any]]] = []
+
+    def instead(*given: Any, report: object, **options: Any) -> None:
+        told.append((given, options))
+        raise ValueRangeError("nothing holds")
+
+    monkeypatch.setattr(passiflex.limits, "recommend_for", instead)
+    words = ["--rate", "2 kHz", "--delay", "1 ms", "--task", "position", "--inner-loop", "plain"]
+    result = Shell(monkeypatch, capsys)("recommend", scenario, *words, "--margin", "10 %")
+    assert (result.status, result.err) == (2, "passiflex: nothing holds\n")
+    assert told.pop() == ((str(scenario), 0.1, "2 kHz", "1 ms"), {"task": "position", "inner_loop": "plain"})
+    assert (
+        "recommended: nothing; nothing holds\n"
+        in limits(capsys, monkeypatch, scenario, *words, "--recommend").out
+    )
+    ((problem,), options) = told.pop()
+    assert (problem.sampling.period, options) == (1 / 2000, {"inner_loop": "plain"})
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["planar2r"], "a robot alone has no control rate; needs one beside it; try --rate '1 kHz'"),
+        (["planar2", "--rate", "1 kHz"], "unknown robot; got 'planar2'; "),
+        (["planar2r", "--rate", "1 m"], "rate; got '1 m'; needs Hz, one number, > 0"),
+        (["planar2r", "--rate", "1 kHz", "--margin", "3 N"], "margin; got '3 N'; "),
+        (["planar2r", "--rate", "1 kHz", "--margin", "100 %"], "margin; got 1; needs 0 to below 1"),
+    ],
+)
+def test_what_recommend_cannot_take_is_one_line(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, words: list[str], message: str
+) -> None:
+    result = Shell(monkeypatch, capsys)("recommend", *words)
+    assert result.status == 2
+    assert result.err.startswith(f"passiflex: {message}")
+    assert len(result.err.splitlines()) == 1
+
+
+def test_task_and_inner_loop_stand_for_those_of_the_scenario(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, scenario: Path, tmp_path: Path
+) -> None:
+    written = yaml.safe_load(scenario.read_text())
+    matched = tmp_path / "matched.yaml"
+    matched.write_text(yaml.safe_dump(merged(written, {"control": {"inner_loop": "matched"}})))
+    result = limits(capsys, monkeypatch, scenario, "--inner-loop", "matched", "--task", "position")
+    (radius,) = re.findall(r"│ these gains +│ (0\.\d+) ", result.out)
+    assert radius == f"{check(matched).spectrum.radius:.5f}"
+    assert radius != f"{check(scenario).spectrum.radius:.5f}"
+    result = limits(capsys, monkeypatch, scenario, "--task", "pose")
+    assert result.status == 2
+    assert "law.stiffness.rotation: missing; a pose task needs it" in result.err
 
 
 def test_why_gives_every_remedy_with_what_to_write(

@@ -18,13 +18,13 @@ from passiflex.limits import LimitMap, check, limit_map
 from passiflex.limits.confirmation import VISIBLE, Confirmation, confirm, disturbed, growth
 from passiflex.limits.limit_map import DAMPING_SCALES, INERTIA_RATIOS, STIFFNESS_RATIOS, STIFFNESS_SCALES
 from passiflex.limits.planes import Plane, least_inertias, scaled_impedance, stable_damping, within
-from passiflex.limits.subject import sampled_problem
-from passiflex.simulation import Problem, resolve
+from passiflex.limits.subject import sampled_problem, with_task
+from passiflex.simulation import Problem, parse_scenario, resolve
 from passiflex.simulation import admissible as border
 from passiflex.simulation.admissible import shaping
 from passiflex.simulation.altered import altered
 from passiflex.simulation.linear_loop import LinearLoop
-from worlds import PLAIN, world
+from worlds import PLAIN, merged, world
 
 HALF = 0.5e-3
 MATCHED = {"inner_loop": "matched", "external_torque": "none"}
@@ -273,3 +273,49 @@ def test_a_rate_or_delay_that_makes_no_sense_is_refused(told: dict[str, Any], me
 def test_mistakes_in_a_file_are_told() -> None:
     with pytest.raises(ScenarioError):
         check("none.yaml")
+
+
+# Another task, another inner loop
+
+
+POSE = {
+    "robot": "iiwa14",
+    "posture": [0.0, 0.5, 0.0, -1.2, 0.0, 0.6, 0.0],
+    "law": {
+        "task": "pose",
+        "stiffness": {"translation": 300, "rotation": 20},
+        "damping": {"matrix": np.diag([60.0, 50, 40, 3, 2, 1])},
+        "shaped_stiffness": {"ratio": 1},
+    },
+    "control": {"fallback": {"stiffness": {"translation": 100, "rotation": 10}}},
+    "gains": [{"at": 0.2, "duration": 0.1, "stiffness": {"translation": 200, "rotation": 10}}],
+    "reference": [{"at": 0.1, "kind": "step", "by": [0, 0, 0.05], "turn": [0, 0, 0.1]}],
+}
+
+
+def test_a_pose_becomes_a_position_that_keeps_what_it_has_of_translation() -> None:
+    position = {
+        "law": {
+            "task": "position",
+            "stiffness": {"rotation": None},
+            "damping": {"matrix": np.diag([60.0, 50, 40])},
+        },
+        "control": {"fallback": {"stiffness": {"rotation": None}}},
+        "gains": [{"at": 0.2, "duration": 0.1, "stiffness": {"translation": 200}}],
+        "reference": [{"at": 0.1, "kind": "step", "by": [0, 0, 0.05]}],
+    }
+    data = merged(merged(yaml.safe_load(PLAIN), {"law": {"damping": {"translation": None}}}), POSE)
+    scenario, written = (parse_scenario(yaml.safe_dump(d)) for d in (data, merged(data, position)))
+    assert with_task(scenario, "position").to_yaml() == written.to_yaml()
+    assert with_task(scenario, "pose").to_yaml() == scenario.to_yaml()
+    with pytest.raises(ScenarioError, match=r"law\.stiffness\.rotation: missing; a pose task needs it"):
+        with_task(written, "pose")
+
+
+def test_a_problem_takes_another_inner_loop_as_its_scenario_does() -> None:
+    loops = [sampled_problem(s, inner_loop="matched") for s in (problem(), world(control={"delay": HALF}))]
+    written = resolve(world(control={"delay": HALF, "inner_loop": "matched"}))
+    for loop in loops:
+        assert loop.configuration.replace(", changed in memory", "") == written.configuration
+        assert check(loop).spectrum.radius == check(written).spectrum.radius
+    assert check(problem()).spectrum.radius != check(written).spectrum.radius

@@ -18,7 +18,7 @@ from passiflex.passivity.extremes import extremes, extremes_of_rows
 from passiflex.simulation import Run, parse_scenario, salvage, simulate
 from passiflex.simulation.batch import simulate_batch, simulate_in_lane
 from passiflex.simulation.integrate import Stretch, smooth_stretch
-from passiflex.simulation.resolve import resolve
+from passiflex.simulation.resolution import resolve
 from worlds import PERIOD, by_rows, merged, planar_text, ran, world
 
 JUDGED = ("verdict", "time", "term", "margin", "margin_time", "integration_error", "books_error")
@@ -98,7 +98,7 @@ def test_nor_in_continuous_time(ratio: float, monkeypatch: pytest.MonkeyPatch) -
         smooth.append(1)
         return smooth_stretch(*arguments)
 
-    monkeypatch.setattr(import_module("passiflex.simulation.simulate"), "smooth_stretch", counted)
+    monkeypatch.setattr(import_module("passiflex.simulation.through_time"), "smooth_stretch", counted)
     law = {"shaped_inertia": {"ratio": ratio}}
     runs = [continuous(output_interval=interval, law=law) for interval in (0.001, 0.03, 0.6)]
     assert bool(smooth) == (ratio == 0.002)

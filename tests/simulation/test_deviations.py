@@ -13,7 +13,7 @@ from passiflex.robots.flexible import RobotState
 from passiflex.simulation import ClosedLoop, Problem, parse_scenario, resolve, simulate
 from passiflex.simulation.altered import altered
 from passiflex.simulation.posture import posture
-from passiflex.simulation.resolve import SCALED
+from passiflex.simulation.resolution import SCALED
 from worlds import world
 
 CONTINUOUS: dict[str, Any] = {"control": None, "tank": None}

@@ -9,7 +9,7 @@ import pytest
 
 from passiflex.errors import ScenarioError
 from passiflex.robots import SerialArm
-from passiflex.simulation import parse_scenario, resolve
+from passiflex.simulation import Scenario, parse_scenario, resolve
 from passiflex.simulation import resolve as exported
 from passiflex.studies import shipped_scenario
 from worlds import world
@@ -58,8 +58,10 @@ def test_a_changed_copy_is_taken_as_if_it_were_written() -> None:
         ({"output_interval": 0.0015}, "output_interval: needs a whole multiple of the period, 0.001 s; got 0.0015 s"),
     ],
 )  # fmt: skip
-def test_a_mistake_in_a_changed_copy_is_at_its_place_in_the_text(update: dict[str, Any], line: str) -> None:
-    copy = world().model_copy(update=update)
+def test_what_was_made_without_checks_is_refused_at_its_place_in_the_text(
+    update: dict[str, Any], line: str
+) -> None:
+    copy = Scenario.model_construct(**dict(world()) | update)
     with pytest.raises(
         ScenarioError, match=rf"^scenario .*: 1 mistake\n  line \d+, column \d+, {line}"
     ) as ours:

@@ -14,7 +14,7 @@ from passiflex.errors import RunFileError
 from passiflex.passivity import audit
 from passiflex.simulation import Run, parse_scenario, simulate
 from passiflex.simulation.run_file import FORMAT
-from passiflex.simulation.salvage import salvage
+from passiflex.simulation.salvaged import salvage
 from worlds import PLANAR
 
 

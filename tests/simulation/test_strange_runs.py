@@ -22,7 +22,7 @@ from passiflex.simulation import Run, parse_scenario, resolve, run_bounds, simul
 from passiflex.simulation.run import JOINT_PARAMETERS
 from passiflex.simulation.run_arm import chain_of, problem_of, robot_of
 from passiflex.simulation.run_attributes import KINDS
-from passiflex.simulation.salvage import salvage
+from passiflex.simulation.salvaged import salvage
 from passiflex.views import ideal_motion, marks_of
 from worlds import PLANAR
 

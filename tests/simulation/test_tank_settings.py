@@ -22,6 +22,7 @@ from passiflex.sampled.controller import SampledController
 from passiflex.sampled.signals import ControlParameters, Wish
 from passiflex.sampled.tanks import TANKS
 from passiflex.simulation import parse_scenario
+from passiflex.simulation.tank_uses import CONTINUOUS, SAMPLED
 from worlds import PLAIN, merged, planar_text
 
 UNUSUAL: dict[str, Any] = {
@@ -40,7 +41,7 @@ def text(kind: str, name: str, **more: Any) -> str:
 @pytest.mark.parametrize("name", UNUSUAL)
 @pytest.mark.parametrize("kind", TANKS)
 def test_a_kind_takes_what_it_uses_and_refuses_the_rest(kind: str, name: str) -> None:
-    if name in TANKS[kind].uses:
+    if name in SAMPLED[kind].always:
         tank = parse_scenario(text(kind, name)).tank
         assert tank is not None
         assert getattr(tank, name) != getattr(type(tank)().completed("port"), name) or name == "accounting"
@@ -87,7 +88,7 @@ def test_what_a_kind_says_that_it_uses_is_what_its_code_depends_on(kind: str) ->
     tank = TANKS[kind]
     level, (_, g) = cs.SX.sym("T"), tank.layout.symbols("g")
     endless = {"accounting"} if not cs.symvar(tank().budget(level, cs.SX.sym("dt"), g)) else set()
-    assert named_in_the_code(kind) - endless == {*tank.uses, *tank.gates}
+    assert named_in_the_code(kind) - endless == {*SAMPLED[kind].all}
 
 
 def test_what_the_continuous_tank_says_that_it_uses_is_what_its_code_depends_on() -> None:
@@ -97,8 +98,10 @@ def test_what_the_continuous_tank_says_that_it_uses_is_what_its_code_depends_on(
     everything = cs.vertcat(*tank.flow(T, P_D, P_X, g), tank.valve(T, g))
     used = cs.which_depends(everything, vector, 1, False)
     names = [f.name.removeprefix("tank_").replace("signed", "accounting") for f in tank.layout]
-    assert [n for n, flag in zip(names, used, strict=True) if flag] == [n for n in names if n in tank.uses]
-    assert {*names} == {*tank.uses}
+    assert [n for n, flag in zip(names, used, strict=True) if flag] == [
+        n for n in names if n in CONTINUOUS.always
+    ]
+    assert {*names} == {*CONTINUOUS.always}
 
 
 def line(text: str) -> str:

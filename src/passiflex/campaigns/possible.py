@@ -6,7 +6,7 @@ from passiflex.campaigns.campaign import Campaign
 from passiflex.campaigns.ends import at_medians, trials
 from passiflex.errors import PassiflexError, ScenarioError
 from passiflex.robots.flexible import FlexibleJointRobot
-from passiflex.simulation.resolve import resolve
+from passiflex.simulation.resolution import resolve
 from passiflex.simulation.scenario import Scenario
 from passiflex.texts.yaml_tree import dotted
 

@@ -15,8 +15,7 @@ from passiflex.campaigns.draws import columns, draws, scenario_seed
 from passiflex.campaigns.target import PathRefusedError, Target, complete_data, locate
 from passiflex.errors import ScenarioError, SizeError
 from passiflex.simulation.scenario import Scenario
-from passiflex.texts.model_mistakes import explained
-from passiflex.texts.yaml_tree import dotted
+from passiflex.texts.model_mistakes import told
 
 Values = dict[str, Value | tuple[Value, ...]]
 """What each parameter is: a number, word or flag; or one per joint."""
@@ -95,5 +94,4 @@ def _scenario(
     try:
         return Scenario.model_validate(data)
     except ValidationError as error:
-        mistakes = [f"{dotted(place)}: {message}" for place, message, _ in explained(error, data, Scenario)]
-        raise ScenarioError(f"scenario {name!r}", mistakes) from None
+        raise ScenarioError(f"scenario {name!r}", told(error, data, Scenario)) from None

@@ -17,7 +17,7 @@ from passiflex.campaigns.measures import MEASURES
 from passiflex.campaigns.samples import values_of_row, with_values
 from passiflex.errors import NameUnknownError, PassiflexError, ValueRangeError
 from passiflex.simulation.problem import Problem
-from passiflex.simulation.resolve import resolve
+from passiflex.simulation.resolution import resolve
 from passiflex.simulation.scenario import Scenario
 
 Array = NDArray[np.float64]

@@ -1,4 +1,4 @@
-"""The command line: `passiflex reproduce`, `simulate`, `audit`, `show`, `plot`, `limits`, `campaign` and others."""
+"""The command line: its commands are those of `cli.command_table`."""
 
 from __future__ import annotations
 
@@ -8,6 +8,10 @@ import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
+
+from passiflex.cli.front import answer
+from passiflex.cli.streams import leave_closed_pipe, printable, replace_what_cannot_be_shown
+from passiflex.errors import PassiflexError
 
 if TYPE_CHECKING:
     from types import FrameType
@@ -19,14 +23,24 @@ FAULT = 70
 
 
 def application() -> App:
-    """Return the command line with all its commands."""
-    from passiflex.cli import (  # noqa: F401 - they register their commands
-        campaign_commands,
-        commands,
-        view_commands,
-    )
-    from passiflex.cli.terminal import app
+    """Return the command line with all its commands, each imported when it is called."""
+    import cyclopts
 
+    from passiflex.cli.command_table import GROUPS
+    from passiflex.cli.front import COMPLETION
+    from passiflex.cli.terminal import console
+    from passiflex.version import __version__
+
+    app = cyclopts.App(
+        name="passiflex",
+        version=__version__,
+        console=console,
+        suppress_keyboard_interrupt=False,  # main says what an interruption means
+    )
+    for wanted, group in GROUPS.items():
+        for command in group:
+            app.command(command.place, name=command.name, group=wanted)
+    app.register_install_completion_command(name=COMPLETION)
     return app
 
 
@@ -36,13 +50,10 @@ def main() -> None:
     The exit status is that of the command; 2 for a mistake of the user, FAULT for one of ours, 128 and the number
     of the signal for an interruption, CLOSED_PIPE where nobody reads what is printed.
     """
-    from passiflex.cli.terminal import leave_closed_pipe, printable, replace_what_cannot_be_shown
-    from passiflex.errors import PassiflexError
-
     replace_what_cannot_be_shown()
     try:
         with _ended_quietly():
-            status = application()(sys.argv[1:], result_action="return_value")
+            status = _run(sys.argv[1:])
             if sys.stdout is not None:
                 sys.stdout.flush()
     except PassiflexError as error:
@@ -60,6 +71,14 @@ def main() -> None:
         print("passiflex: this is a fault of passiflex, not of yours; please report it", file=sys.stderr)
         sys.exit(FAULT)
     sys.exit(status if isinstance(status, int) else 0)
+
+
+def _run(arguments: list[str]) -> object:
+    """Return what a command returned; 0 where the front has the answer, before anything is imported for it."""
+    if (text := answer(arguments)) is None:
+        return application()(arguments, result_action="return_value")
+    print(text)
+    return 0
 
 
 @contextmanager

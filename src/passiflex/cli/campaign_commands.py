@@ -8,13 +8,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import cyclopts
 
-from passiflex.cli.terminal import app, campaign_bar, console, progress_lines, timed
+from passiflex.cli.terminal import campaign_bar, console, progress_lines, timed
 
 if TYPE_CHECKING:
     from passiflex.campaigns import Results
 
 
-@app.command
 def campaign(
     campaign: Path,
     *,
@@ -50,7 +49,6 @@ def campaign(
     return 0
 
 
-@app.command
 def replay(
     folder: Path,
     *,
@@ -76,7 +74,6 @@ def replay(
     return 2 if run.failure else 0
 
 
-@app.command
 def search(
     campaign: Path,
     *,

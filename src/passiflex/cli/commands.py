@@ -7,21 +7,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import cyclopts
-from rich.table import Table
-from rich.text import Text
 
-from passiflex.cli.terminal import app, console, progress_lines, timed
+from passiflex.cli.terminal import console, progress_lines, timed
 
 if TYPE_CHECKING:
     from passiflex.passivity import Audit
-    from passiflex.simulation import Problem, Run
+    from passiflex.simulation import Run
 
 WORTH_A_WORD = 1e-6
 """Energy [J] below which a bound is round-off."""
 EXIT = {"passive": 0, "violated": 1, "inconclusive": 2}
 
 
-@app.command
 def reproduce(
     *figures: str,
     out: Annotated[Path, cyclopts.Parameter(help="folder for figures, runs and summary.json")] = Path(
@@ -54,7 +51,6 @@ def reproduce(
     return 0
 
 
-@app.command
 def simulate(
     scenario: Path,
     *,
@@ -62,15 +58,17 @@ def simulate(
 ) -> int:
     """Run a scenario file and write the run as one netCDF file; exit status 2 if the run ended early."""
     from passiflex.files import require_writable
-    from passiflex.simulation import load_scenario, resolve, simulate_problem
-    from passiflex.simulation.cautions import cautions
-    from passiflex.simulation.passed_limits import passed_limits
+    from passiflex.simulation import load_scenario
 
     with timed():
         with progress_lines() as report:
             _refuse_target(scenario, out)
             read = load_scenario(scenario)
             require_writable(out.parent)
+
+            from passiflex.simulation import passed_limits, resolve, simulate_problem
+            from passiflex.simulation.cautions import cautions
+
             problem = resolve(read)
             for caution in cautions(problem):
                 console.print(f"note: {caution}")
@@ -86,11 +84,12 @@ def simulate(
     return 2 if run.failure else 0
 
 
-@app.command
 def audit(run: Path) -> int:
     """Audit a run: exit status 0 passive, 1 violated, 2 inconclusive or not usable."""
+    from rich.table import Table
+
     from passiflex.passivity import audit as audit_run
-    from passiflex.simulation.passed_limits import passed_limits
+    from passiflex.simulation.passed_limit import passed_limits
     from passiflex.simulation.run import Run
     from passiflex.simulation.run_file import remarks
 
@@ -124,63 +123,10 @@ def audit(run: Path) -> int:
     return EXIT[result.verdict]
 
 
-@app.command
-def limits(
-    scenario: Path,
-    *,
-    rate: Annotated[
-        str | None, cyclopts.Parameter(help="control rate, as '1 kHz'; the scenario's own")
-    ] = None,
-    delay: Annotated[
-        str | None, cyclopts.Parameter(help="of a command, as '1 ms'; the scenario's own")
-    ] = None,
-    recommend: Annotated[
-        bool, cyclopts.Parameter(negative="", help="also find gains with a margin of 20 %")
-    ] = False,
-    why: Annotated[
-        bool,
-        cyclopts.Parameter(
-            negative="", help="also all borders, other delays, and every remedy that was tried"
-        ),
-    ] = False,
-    out: Annotated[Path | None, cyclopts.Parameter(help="folder for limits.png and limits.pdf")] = None,
-) -> int:
-    """Say which gains a scenario's robot bears at its rate and delay: exit status 0 if its own are stable, 1 if not.
-
-    A scenario in continuous time needs --rate.
-    """
-    from passiflex.cli.limit_tables import border_table, confirmation_table, why_lines
-    from passiflex.files import require_writable
-    from passiflex.limits import limit_map
-    from passiflex.limits.subject import sampled_problem
-
-    with timed():
-        with progress_lines() as report:
-            problem = sampled_problem(scenario, rate, delay)
-            if out is not None:
-                require_writable(out)
-            found = limit_map(problem, pictured=why or out is not None, report=report)
-        console.print(found.sentence)
-        if found.admissible.stable:
-            console.print(found.margin.words)
-        for line in why_lines(found) if why else ():
-            console.print(line)
-        console.print(border_table(found))
-        console.print(confirmation_table(found))
-        if recommend:
-            _print_recommendation(problem)
-        if out is not None:
-            from passiflex.plotting.figures import save_figure
-            from passiflex.plotting.limits import draw_limits
-
-            for path in save_figure(draw_limits(found), out / "limits"):
-                console.print(f"wrote {path}")
-    return 0 if found.admissible.stable else 1
-
-
-@app.command
 def robots() -> int:
     """List the robots of the catalogue, and where their numbers come from."""
+    from rich.text import Text
+
     from passiflex.robots.catalogue import catalogue, read_description
 
     for name in catalogue():
@@ -199,21 +145,6 @@ def _wrong_books(run: Run, result: Audit) -> str:
         return f"the tank claims up to {result.books_error:.3g} J beyond what is there"
     why = f" ({result.unbooked})" if result.unbooked != NOTHING else ""
     return f"the law's own books are wrong by up to {result.books_error:.3g} J{why}"
-
-
-def _print_recommendation(problem: Problem) -> None:
-    """Print gains with a margin, or why there are none."""
-    from passiflex.errors import ValueRangeError
-    from passiflex.limits.recommend_for import recommend_for
-
-    try:
-        with progress_lines() as report:
-            advice = recommend_for(problem, report=report)
-    except ValueRangeError as nothing:
-        console.print(f"recommended: nothing; {nothing}")
-        return
-    console.print(f"recommended: {advice.sentence}")
-    console.print(advice.snippet)
 
 
 def _print_control(run: Run) -> None:

@@ -1,28 +1,20 @@
-"""The terminal: the application that commands register with, and how they show that they work."""
+"""The terminal: how commands print, and how they show that they work."""
 
 from __future__ import annotations
 
-import os
-import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any
 
-import cyclopts
 from rich.console import Console
 from rich.text import Text
 
+from passiflex.cli.streams import drop_output, leave_closed_pipe, printable
 from passiflex.files import OutputError
 
 if TYPE_CHECKING:
     from passiflex.pieces.run_pieces import Progress
-
-CLOSED_PIPE = 141
-"""Exit status when nobody reads on, as that of a program that SIGPIPE ends."""
-_CONTROLS = {
-    code: "\N{REPLACEMENT CHARACTER}" for code in (*range(32), *range(127, 160)) if code not in (9, 10)
-}
 
 
 class PlainConsole(Console):
@@ -49,37 +41,6 @@ class PlainConsole(Console):
 
 
 console = PlainConsole()
-app = cyclopts.App(
-    name="passiflex",
-    help="Passive Cartesian impedance control of flexible-joint robots, with its energy accounted for.",
-    console=console,
-    suppress_keyboard_interrupt=False,  # main says what an interruption means
-)
-
-
-def printable(text: str) -> str:
-    """Return a text without characters that steer a terminal."""
-    return text.translate(_CONTROLS)
-
-
-def replace_what_cannot_be_shown() -> None:
-    """Make the streams show a replacement for what their encoding does not have, in place of an error."""
-    for stream, how in ((sys.stdout, "replace"), (sys.stderr, "backslashreplace")):
-        if hasattr(stream, "reconfigure"):
-            stream.reconfigure(errors=how)
-
-
-def leave_closed_pipe() -> NoReturn:
-    """End without another word."""
-    drop_output()
-    raise SystemExit(CLOSED_PIPE)
-
-
-def drop_output() -> None:
-    """Send what is left in the stream's buffer nowhere, or the end of the process would try it again."""
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nowhere, sys.stdout.fileno())
-    os.close(nowhere)
 
 
 @contextmanager

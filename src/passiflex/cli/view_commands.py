@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import cyclopts
 
-from passiflex.cli.terminal import app, console, timed
-from passiflex.simulation.salvage import Salvaged
+from passiflex.cli.terminal import console, timed
+
+if TYPE_CHECKING:
+    from passiflex.simulation.salvaged import Salvaged
 
 Compared = Annotated[
     tuple[Path, ...],
@@ -20,7 +22,6 @@ Compared = Annotated[
 DRAWN = (".png", ".pdf", ".svg")
 
 
-@app.command
 def show(
     run: Path,
     *,
@@ -49,7 +50,6 @@ def show(
     return 0
 
 
-@app.command
 def plot(
     run: Path,
     *,
@@ -77,7 +77,6 @@ def plot(
     return 0
 
 
-@app.command
 def export(
     run: Path,
     *,
@@ -101,7 +100,7 @@ def export(
 
 def _read(*paths: Path) -> list[Salvaged]:
     """Return what can be read of each file, after a line on everything that is wrong with it."""
-    from passiflex.simulation.salvage import salvage
+    from passiflex.simulation.salvaged import salvage
 
     read = [salvage(path) for path in paths]
     for path, (_, notices) in zip(paths, read, strict=True):

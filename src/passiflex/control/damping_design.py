@@ -8,6 +8,7 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
+from passiflex.control.definite import require_positive_definite
 from passiflex.errors import ValueRangeError
 
 NEAR, ROUNDS = 0.01, 20
@@ -34,22 +35,6 @@ class ElasticArm(NamedTuple):
     joint_stiffness: NDArray[np.float64]
     joint_damping: NDArray[np.float64]
     jacobian: NDArray[np.float64]
-
-
-def require_positive_definite(name: str, matrix: NDArray[np.float64]) -> None:
-    """Raise ValueRangeError unless `matrix` is symmetric and positive definite."""
-    if not np.allclose(matrix, matrix.T, rtol=1e-12, atol=0):
-        worst = np.abs(matrix - matrix.T).max()
-        raise ValueRangeError(
-            f"{name} is not symmetric", got=f"difference {worst:.3g}", needs="a symmetric matrix"
-        )
-    least = float(np.linalg.eigvalsh(matrix).min())
-    if not least > 0:
-        raise ValueRangeError(
-            f"{name} is not positive definite",
-            got=f"smallest eigenvalue {least:.6g}",
-            needs="> 0 in every direction",
-        )
 
 
 def damping_from_ratio(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from types import SimpleNamespace
-from typing import ClassVar, NamedTuple
+from typing import NamedTuple
 
 import casadi as cs
 
@@ -47,8 +47,6 @@ class EnergyTank:
     motion of the reference (its clock runs slower and stops), which renders P_X = 0 as the paper asks.
     """
 
-    uses: ClassVar[tuple[str, ...]] = ("fill", "floor", "low", "cap", "band", "accounting")
-    """Settings that it goes by."""
     layout: Layout = Layout(
         (
             Field("tank_fill", (), "1", "α when the tank is not full, 0..1"),

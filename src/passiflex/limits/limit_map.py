@@ -122,6 +122,8 @@ def limit_map(
     rate: float | str | None = None,
     delay: float | str | None = None,
     *,
+    task: str | None = None,
+    inner_loop: str | None = None,
     confirmed: bool = True,
     pictured: bool = True,
     report: Report = lambda text: None,
@@ -133,6 +135,7 @@ def limit_map(
     Parameters
     ----------
     rate, delay: [Hz], [s]; text may name a unit.
+    task, inner_loop: pose or position, plain or matched; its own unless given.
     confirmed: Whether to simulate points on both sides of the borders.
     pictured: Whether the map is to be drawn; without, only its own delay and what the tables say of it are looked at.
     report: Is told what is being done.
@@ -142,7 +145,7 @@ def limit_map(
     PassiflexError
         If there is no rate, rate or delay make no sense, or the scenario does not fit its robot.
     """
-    problem = sampled_problem(subject, rate, delay)
+    problem = sampled_problem(subject, rate, delay, task=task, inner_loop=inner_loop)
     assert problem.sampling is not None
     name, period = problem.name, problem.sampling.period
     report(f"{name}: compiling")

@@ -21,7 +21,7 @@ from passiflex.limits.box_slopes import steepest
 from passiflex.simulation import Problem
 from passiflex.simulation.linear_loop import LinearLoop
 from passiflex.simulation.loop_at_rest import standing
-from passiflex.simulation.resolve import SCALED
+from passiflex.simulation.resolution import SCALED
 
 Array = NDArray[np.float64]
 Gains = Mapping[str, Array]

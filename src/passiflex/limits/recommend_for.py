@@ -22,6 +22,7 @@ def recommend_for(
     rate: float | str | None = None,
     delay: float | str | None = None,
     *,
+    task: str | None = None,
     inner_loop: str | None = None,
     report: Report = lambda text: None,
 ) -> Recommendation:
@@ -29,12 +30,18 @@ def recommend_for(
 
     What it returns is a piece of that scenario: pasted into it, `simulate` and `limits` accept it.
 
+    Parameters
+    ----------
+    margin: 0 to below 1, as 0.2 for 20 %.
+    rate, delay, task: Its own unless given.
+    inner_loop: plain or matched; the better of the two if left out.
+
     Raises
     ------
     ValueRangeError
         For the rigid law, which shapes nothing; and as `recommend`.
     """
-    problem = sampled_problem(subject, rate, delay)
+    problem = sampled_problem(subject, rate, delay, task=task)
     law = problem.law
     if not isinstance(law, ImpedanceLaw):
         raise ValueRangeError(

@@ -2,42 +2,79 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from passiflex.errors import ValueRangeError
-from passiflex.simulation import Problem, Scenario, load_scenario, parse_scenario, resolve
+from passiflex.simulation import Problem, Scenario, parse_scenario, resolve
 from passiflex.simulation.altered import HIGHEST_RATE, altered, at_rate
+from passiflex.simulation.scenario_file import as_scenario
 from passiflex.texts.quantity import Quantity
 
-Subject = Problem | Scenario | str | Path
-"""A problem, a scenario, or the path of a scenario file."""
+Subject = Problem | Scenario | Mapping[str, Any] | str | Path
+"""A problem, a scenario, a mapping with the entries of a scenario file, or the path of one."""
 
+GAINS = ("stiffness", "damping", "target_inertia")
+"""That have a part for translation and one for rotation."""
 RATE = Quantity("Hz", above=0, most=HIGHEST_RATE)
 DELAY = Quantity("s", least=0)
 
 
 def sampled_problem(
-    subject: Subject, rate: float | str | None = None, delay: float | str | None = None
+    subject: Subject,
+    rate: float | str | None = None,
+    delay: float | str | None = None,
+    *,
+    task: str | None = None,
+    inner_loop: str | None = None,
 ) -> Problem:
     """Return the problem at a rate [Hz] and delay [s], its own unless given; text may name a unit, as "1 kHz".
 
-    A scenario or problem in continuous time becomes a sampled one with the plain inner loop.
+    A scenario or problem in continuous time becomes a sampled one, with the plain inner loop unless another is given.
 
     Raises
     ------
     ValueRangeError
         If there is no rate, or what is given is no rate or delay.
     PassiflexError
-        If the scenario has mistakes, or does not fit its robot.
+        If the scenario has mistakes, or does not fit its robot, the task or the inner loop.
     """
     hertz = None if rate is None else number("rate", rate, RATE)
     late = None if delay is None else number("delay", delay, DELAY)
+    robot = None
     if isinstance(subject, Problem):
-        if subject.sampling is not None:
+        if subject.sampling is not None and task is None and inner_loop is None:
             return altered(subject, rate=hertz, delay=late)
-        return resolve(at_rate(parse_scenario(subject.configuration), hertz, late), subject.law.robot)
-    scenario = subject if isinstance(subject, Scenario) else load_scenario(subject)
-    return resolve(at_rate(scenario, hertz, late))
+        robot = subject.law.robot
+        subject = parse_scenario(subject.configuration)
+    scenario = as_scenario(subject)
+    if task is not None:
+        scenario = with_task(scenario, task)
+    scenario = at_rate(scenario, hertz, late)
+    if inner_loop is not None:
+        scenario = scenario.changed({"control.inner_loop": inner_loop})
+    return resolve(scenario, robot)
+
+
+def with_task(scenario: Scenario, task: str) -> Scenario:
+    """Return the scenario with another task of its law; of a pose, a position keeps what it has of translation."""
+    changes: dict[str, Any] = {"law.task": task}
+    if task == "position":
+        places: list[tuple[str, Any]] = [("law", scenario.law)]
+        if scenario.control is not None:
+            places.append(("control.fallback", scenario.control.fallback))
+        places += [(f"gains[{i}]", change) for i, change in enumerate(scenario.gains)]
+        for place, section in places:
+            for name in GAINS:
+                gains = getattr(section, name, None)
+                if gains is not None and gains.rotation is not None:
+                    changes[f"{place}.{name}.rotation"] = None
+                if gains is not None and gains.matrix is not None:
+                    changes[f"{place}.{name}.matrix"] = [row[:3] for row in gains.matrix[:3]]
+        turning = (i for i, event in enumerate(scenario.reference) if hasattr(event, "turn"))
+        changes |= {f"reference[{i}].turn": None for i in turning}
+    return scenario.changed(changes)
 
 
 def number(name: str, written: float | str, quantity: Quantity) -> float:

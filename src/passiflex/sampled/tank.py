@@ -76,10 +76,6 @@ class AbstractTank(abc.ABC):
             Field("tank_braking", (), "N m s/rad", "α_max: most damping that the tank adds, if it adds any"),
         )
     )
-    uses: ClassVar[tuple[str, ...]]
-    """Settings that it goes by, beside its level at the start: `accounting` is `tank_signed`, the others go by name."""
-    gates: ClassVar[tuple[str, ...]] = ()
-    """Settings that only its valve goes by: they act where something is gated."""
     measures: ClassVar[bool] = False
     """Whether the level follows from the measured port: what that may get wrong is then not granted."""
     falls_back: ClassVar[bool] = False

@@ -22,7 +22,6 @@ class PortTank(AbstractTank):
     does, S + V̂(q) ≥ 0 with the weight V̂ of its model, and Σw − (V̂ − V̂₀) ≤ S₀ + V̂₀ + T₀.
     """
 
-    uses: ClassVar[tuple[str, ...]] = ("floor", "low", "cap", "power", "trip", "accounting")
     measures: ClassVar[bool] = True
     falls_back: ClassVar[bool] = True
 
@@ -57,8 +56,6 @@ class PaperTank(AbstractTank):
     credits energy that nobody dissipated.
     """
 
-    uses: ClassVar[tuple[str, ...]] = ("fill", "floor", "low", "cap", "power", "accounting")
-
     def settle(self, level: cs.SX, flows: PeriodFlows, g: SimpleNamespace) -> TankEntry:
         """Return the entry of α P_D Δt."""
         ok = finite(level, flows.claimed_loss)
@@ -91,8 +88,6 @@ class TimeDomainTank(AbstractTank):
     reference: what that gives shows at the port a moment later.
     """
 
-    uses: ClassVar[tuple[str, ...]] = ("cap", "braking")
-    gates: ClassVar[tuple[str, ...]] = ("floor", "low")
     measures: ClassVar[bool] = True
 
     def settle(self, level: cs.SX, flows: PeriodFlows, g: SimpleNamespace) -> TankEntry:
@@ -128,8 +123,6 @@ class VariableStiffnessTank(AbstractTank):
     back: T_k+1 = T_k + α ẋᵀD_xẋ Δt + work done on that part. As the tank runs empty, that part is switched
     off. A change of the stiffness is free, and the reference is not gated.
     """
-
-    uses: ClassVar[tuple[str, ...]] = ("fill", "floor", "low", "cap")
 
     def settle(self, level: cs.SX, flows: PeriodFlows, g: SimpleNamespace) -> TankEntry:
         """Return the entry of α ẋᵀD_xẋ Δt and of the work on the variable part."""

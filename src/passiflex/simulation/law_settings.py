@@ -19,7 +19,7 @@ Positive = Annotated[float, Quantity("1", above=0)]
 
 def _definite(matrix: Matrix) -> Matrix:
     """Return a matrix that is symmetric and positive definite."""
-    from passiflex.control.damping_design import require_positive_definite
+    from passiflex.control.definite import require_positive_definite
 
     try:
         require_positive_definite("the matrix", np.array(matrix))
@@ -67,6 +67,7 @@ _FULL = Annotated[Matrix, Quantity("", ((3, 3), (6, 6)))]
 class _Shaped(Section):
     """A joint quantity that the inner loop makes: a multiple of the law's own, or numbers."""
 
+    ways: ClassVar = (("ratio",), ("value",))
     ratio: Annotated[float | Vector, Quantity("1", ((), (None,)), above=0)] | None = Field(
         default=None, description="multiple of the law's own value, one number for all joints or one each"
     )
@@ -112,6 +113,7 @@ class _Gains(Section):
     """A symmetric positive definite matrix of the task, by its blocks or as a whole; zero in axes that are free."""
 
     alternative: ClassVar[str | None] = None
+    ways: ClassVar = (("translation", "rotation"), ("matrix",), ("ratio", "damping_ratio"))
     translation: Matrix | None = Field(default=None, description="translational block")
     rotation: Matrix | None = Field(default=None, description="rotational block; with task pose only")
     matrix: Annotated[_FULL, AfterValidator(_held)] | None = Field(

@@ -31,7 +31,8 @@ class Noise(Section):
             If a hold was asked for that is no multiple of the period.
         """
         if "hold" not in self.model_fields_set:
-            return self.model_copy(update={"hold": max(1, round(self.hold * rate)) / rate})
+            hold = max(1, round(self.hold * rate)) / rate
+            return type(self).model_construct(self.model_fields_set, **dict(self) | {"hold": hold})
         if not is_multiple(self.hold * rate):
             needs = f"a whole multiple of the control period, {1 / rate:g} s: sensors are read once in it"
             raise Mistakes((("hold",), f"needs {needs}; got {self.hold:g} s"))

@@ -15,7 +15,7 @@ from passiflex.simulation.altered import altered, rewritten, with_flange
 from passiflex.simulation.clock_words import hertz
 from passiflex.simulation.judgement import Judgement, holds, judged_fallback
 from passiflex.simulation.problem import Problem
-from passiflex.simulation.resolve import resolve
+from passiflex.simulation.resolution import resolve
 from passiflex.simulation.scenario_file import parse_scenario
 from passiflex.simulation.trial import Change, Trial
 

@@ -18,7 +18,7 @@ from passiflex.robots.chain import SerialChain, read_chain
 from passiflex.robots.flexible import FlexibleJointRobot
 from passiflex.robots.frames import world_frames
 from passiflex.simulation.problem import Problem
-from passiflex.simulation.resolve import resolve
+from passiflex.simulation.resolution import resolve
 from passiflex.simulation.run import JOINT_PARAMETERS, Run
 from passiflex.simulation.scenario import Scenario, Tool
 from passiflex.texts.yaml_tree import RefusedText, Tree

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +10,7 @@ from pydantic import ValidationError
 
 from passiflex.errors import ScenarioError
 from passiflex.simulation.scenario import Scenario
-from passiflex.texts.model_mistakes import explained
+from passiflex.texts.model_mistakes import explained, told
 from passiflex.texts.quantity import shown
 from passiflex.texts.text_file import IN_YAML, UnreadableError, decoded, is_path, read_bytes
 from passiflex.texts.yaml_tree import Place, RefusedText, Tree
@@ -33,6 +34,33 @@ def load_scenario(path: str | Path) -> Scenario:
         )
     path = Path(path)
     return parse_scenario(read_text(path), str(path), path.resolve().parent)
+
+
+def as_scenario(given: Scenario | Mapping[str, Any] | str | Path) -> Scenario:
+    """Return a scenario as it is, that of a mapping with the entries of a file, or that of the file at a path.
+
+    Raises
+    ------
+    ScenarioError
+        With one line for each mistake.
+    """
+    if isinstance(given, Scenario):
+        return given
+    if not isinstance(given, Mapping):
+        return load_scenario(given)
+    data = dict(given)
+    try:
+        return Scenario.model_validate(data)
+    except ValidationError as error:
+        raise ScenarioError("scenario", told(error, data, Scenario)) from None
+
+
+def is_scenario(path: str | Path) -> bool:
+    """Return whether a file has a law, as every scenario has and no robot file; False if it cannot be read."""
+    try:
+        return "law" in Tree().read(read_text(Path(path)), A_SCENARIO)
+    except (RefusedText, ScenarioError):
+        return False
 
 
 def read_text(path: Path) -> str:

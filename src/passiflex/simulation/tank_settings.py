@@ -6,8 +6,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from passiflex.control.tank import EnergyTank
-from passiflex.sampled.tanks import TANKS
+from passiflex.simulation.tank_uses import CONTINUOUS, SAMPLED
 from passiflex.texts.quantity import Quantity
 from passiflex.texts.section import Mistakes, Section
 
@@ -96,8 +95,7 @@ class TankSettings(Section):
 
     def require_used(self, *, sampled: bool) -> None:
         """Raise Mistakes for settings, not at their defaults, that a tank of this kind does not go by."""
-        tank = TANKS[self.kind or "port"] if sampled else EnergyTank
-        known = (*tank.uses, *getattr(tank, "gates", ()))
+        known = (SAMPLED[self.kind or "port"] if sampled else CONTINUOUS).all
         kind = f"a tank of kind {self.kind}{'' if sampled else ' without `control`'}"
         found: list[tuple[tuple[str | int, ...], str]] = [
             ((name,), f"{kind} does not use it; {_users(name)} do; remove it")
@@ -112,7 +110,7 @@ class TankSettings(Section):
 
     def require_gated(self) -> None:
         """Raise Mistakes for settings of a valve that gates nothing, where this kind has no other use for them."""
-        gates = TANKS[self.kind].gates if self.kind else ()
+        gates = SAMPLED[self.kind].gates if self.kind else ()
         what = (
             f"a tank of kind {self.kind} uses it for `actions` and `feedforward` only, and there is neither"
         )
@@ -135,10 +133,14 @@ class TankSettings(Section):
             raise Mistakes((("kind",), what))
 
     def completed(self, kind: Literal["paper", "port"]) -> Self:
-        """Return the settings with `kind` and the accounting that goes with it, where they were left out."""
+        """Return the settings with `kind` and the accounting that goes with it, where they were left out.
+
+        They still count as left out: with another kind they become its own.
+        """
         given = self.model_dump(exclude_unset=True, exclude_none=True)
         defaults = PORT_DEFAULTS if given.get("kind", kind) == "port" else PAPER_DEFAULTS
-        return type(self).model_validate({"kind": kind} | defaults | given)
+        made = type(self).model_validate({"kind": kind} | defaults | given)
+        return type(self).model_construct(set(given), **dict(made))
 
     @property
     def signed(self) -> bool:
@@ -148,6 +150,6 @@ class TankSettings(Section):
 
 def _users(setting: str) -> str:
     """Return the kinds of tanks that go by a setting, in words."""
-    sampled = [kind for kind, tank in TANKS.items() if setting in tank.uses]
+    sampled = [kind for kind, uses in SAMPLED.items() if setting in uses.always]
     kinds = [f"{', '.join(sampled)} with `control`"] if sampled else []
-    return " and ".join(kinds + ["paper without `control`"] * (setting in EnergyTank.uses))
+    return " and ".join(kinds + ["paper without `control`"] * (setting in CONTINUOUS.always))

@@ -97,10 +97,9 @@ def _paper_at_1_khz() -> Scenario:
 
 
 def _baseline_at_1_khz() -> Scenario:
-    scenario = shipped_scenario("fig1_sampled")
-    assert scenario.control is not None
-    control = scenario.control.model_copy(update={"inner_loop": "plain", "external_torque": "measured"})
-    return _sampled(with_baseline(scenario, motor_aware=False), control=control)
+    measured = {"control.inner_loop": "plain", "control.external_torque": "measured"}
+    plain = shipped_scenario("fig1_sampled").changed(measured)
+    return _sampled(with_baseline(plain, motor_aware=False))
 
 
 def _recommended() -> Scenario:

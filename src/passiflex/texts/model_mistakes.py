@@ -13,7 +13,7 @@ from pydantic.fields import FieldInfo
 from passiflex.errors import nearest
 from passiflex.texts.quantity import shown
 from passiflex.texts.section import Mistakes
-from passiflex.texts.yaml_tree import Place
+from passiflex.texts.yaml_tree import Place, dotted
 
 REFUSED_NAME = "refused_name"
 """Type of a PydanticCustomError that is about the name of an entry, not about its value."""
@@ -71,6 +71,12 @@ def explained(error: ValidationError, data: Any, root: Model) -> Iterator[tuple[
             yield place, f"expected letters, digits, and any of _ . -; got {shown(e['input'])}", False
         else:
             yield place, f"{e['msg'][0].lower()}{e['msg'][1:]}; got {shown(e['input'])}", False
+
+
+def told(error: ValidationError, data: Any, root: Model) -> list[str]:
+    """Return one line for each mistake of data that no file has, with its place in it."""
+    found = explained(error, data, root)
+    return [f"{dotted(place)}: {message}" if place else message for place, message, _ in found]
 
 
 def suggested(got: str, known: Iterable[str]) -> str:

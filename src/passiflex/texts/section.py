@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, ClassVar, NoReturn, Self
 
 from pydantic import BaseModel, ConfigDict, model_validator
+
+from passiflex.errors import FrozenError
 
 
 class Mistakes(ValueError):  # noqa: N818 - one exception for all of them
@@ -19,6 +22,8 @@ class Section(BaseModel):
     """A mapping of a file; an entry that is left empty counts as left out."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, validate_by_name=True, validate_by_alias=True)
+    ways: ClassVar[tuple[tuple[str, ...], ...]] = ()
+    """Of a section that can be written in one of several ways: the entries of each."""
 
     @model_validator(mode="before")
     @classmethod
@@ -27,3 +32,43 @@ class Section(BaseModel):
             return written
         known = {f.alias or name for name, f in cls.model_fields.items()}
         return {k: v for k, v in written.items() if v is not None or k not in known}
+
+    def changed(self, entries: Mapping[str, Any] | None = None, /, **more: Any) -> Self:
+        """Return a copy with other entries, validated as those of a file.
+
+        Parameters
+        ----------
+        entries, more: By path, as `{"law.stiffness.translation": "50 N/m"}` or `{"reference[0].at": 1}`; or nested,
+            as `law={"stiffness": {"translation": 50}}`. None leaves an entry out, so that its default counts.
+
+        Raises
+        ------
+        ScenarioError
+            With one line for each unknown name, with the nearest, and each value that does not fit.
+        """
+        from passiflex.texts.changes import changed
+
+        return changed(self, {**(entries or {}), **more})
+
+    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
+        """Return a copy, with whole entries in place of its own; they are validated as those of a file.
+
+        Raises
+        ------
+        ScenarioError
+            As `changed`, which takes paths and parts of entries too.
+        """
+        from passiflex.texts.changes import replaced
+
+        copy = super().model_copy(deep=deep)
+        return replaced(copy, update) if update else copy
+
+    if not TYPE_CHECKING:  # a type checker knows that a section is frozen
+
+        def __setattr__(self, name: str, value: object) -> NoReturn:
+            """Raise FrozenError."""
+            raise FrozenError(type(self).__name__, f"{name} = {value!r}", f"changed({name}={value!r})")
+
+        def __delattr__(self, name: str) -> NoReturn:
+            """Raise FrozenError."""
+            raise FrozenError(type(self).__name__, f"del {name}", f"changed({name}=None)")

@@ -40,7 +40,7 @@ NOTHING = 1e-12
 MOST_ROWS = 2_000_000
 
 
-def simulate(problem: Problem) -> Run:
+def simulate_problem(problem: Problem) -> Run:
     """Return the run of a problem.
 
     A run that leaves the finite numbers, or that the integrator gives up on, is a result too: it ends

@@ -1,0 +1,59 @@
+"""The commands: what each is called, where its function is, and what one wants when one calls it."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+
+class Command(NamedTuple):
+    """A command.
+
+    Attributes
+    ----------
+    name: What is typed.
+    place: Where its function is, as "module:function"; it is imported when the command is called.
+    line: What it does, on the line that it has in the list of all.
+    """
+
+    name: str
+    place: str
+    line: str
+
+
+_MANY, _ONE, _LIMITS, _SEEN = (
+    f"passiflex.cli.{module}:"
+    for module in ("campaign_commands", "commands", "limit_commands", "view_commands")
+)
+
+GROUPS = {
+    "run": (
+        Command("simulate", _ONE + "simulate", "run a scenario file"),
+        Command("reproduce", _ONE + "reproduce", "make the paper's figures again, or a study"),
+        Command(
+            "robots", _ONE + "robots", "list the robots that are here, and where their numbers come from"
+        ),
+    ),
+    "judge": (
+        Command("audit", _ONE + "audit", "say whether a run was passive"),
+        Command("limits", _LIMITS + "limits", "say which gains hold at a rate and a delay"),
+        Command("recommend", _LIMITS + "recommend", "find gains that hold with a margin"),
+    ),
+    "look": (
+        Command("show", _SEEN + "show", "write a run as a page: the moving arm beside its signals"),
+        Command("plot", _SEEN + "plot", "draw a run for a paper or a slide"),
+        Command("export", _SEEN + "export", "write a run for Rerun, Foxglove, PlotJuggler, or as a table"),
+    ),
+    "many robots": (
+        Command("campaign", _MANY + "campaign", "run a scenario for thousands of robots"),
+        Command("replay", _MANY + "replay", "make the full run of one of them"),
+        Command("search", _MANY + "search", "look for the worst case"),
+    ),
+}
+"""What one wants → the commands for it."""
+
+EXAMPLES = (
+    "passiflex reproduce fig1 --out results",
+    "passiflex show results/fig1_proposed.nc",
+    "passiflex recommend iiwa14 --rate '1 kHz' --delay '1 ms'",
+)
+"""To be copied: each works as it is, after those above it."""
