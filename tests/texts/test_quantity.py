@@ -5,11 +5,12 @@ import subprocess
 import sys
 
 import numpy as np
+import pint
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from passiflex.texts.quantity import Quantity
+from passiflex.texts.quantity import USUAL, Quantity, unit_factor
 
 
 @pytest.mark.parametrize(
@@ -192,5 +193,19 @@ def test_numbers_in_the_unit_itself_are_not_changed(number):
 
 
 def test_pint_is_not_imported_before_it_is_needed():
-    code = "import sys, passiflex.simulation.scenario_file; assert 'pint' not in sys.modules"
+    code = """
+import sys
+import passiflex.simulation.scenario_file
+from passiflex.texts.quantity import Quantity
+Quantity("s").convert("3 ms")
+assert "pint" not in sys.modules
+"""
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+@pytest.mark.parametrize(("unit", "wanted"), USUAL)
+def test_usual_units_are_those_of_pint(unit: str, wanted: str) -> None:
+    registry = pint.UnitRegistry()
+    exact = registry.Quantity(1.0, registry.parse_units(unit)).to(registry.parse_units(wanted)).magnitude
+    assert unit_factor(unit, wanted) == pytest.approx(exact, rel=1e-15)
+    assert Quantity(wanted).convert(f"3 {unit}") == pytest.approx(3 * exact, rel=1e-15)

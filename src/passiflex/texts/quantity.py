@@ -22,6 +22,17 @@ _TEXT = re.compile(rf"({_NUMBER})\s*(.*)")
 _OFTEN, _TURNING = re.compile("Hz|hertz"), re.compile("rad|deg|°|turn|rp[ms]|revolution|rotation|cycle|arc")
 _UNIT = re.compile(r"(?:1\s*/)?(?:[A-Za-zµ°%/() ]|\^-?[1-9](?![0-9^.]))*")
 
+USUAL = {
+    ("kHz", "Hz"): 1000.0,
+    ("ms", "s"): 0.001,
+    ("us", "s"): 1e-6,
+    ("cm", "m"): 0.01,
+    ("mm", "m"): 0.001,
+    ("deg", "rad"): math.pi / 180,
+    ("%", "1"): 0.01,
+}
+"""What most files write, in the spelling of `spelt_out`; all else waits for the registry of units, most of a second."""
+
 
 @dataclass(frozen=True)
 class Quantity:
@@ -147,6 +158,8 @@ def unit_factor(unit: str, wanted: str) -> float:
         return 1.0
     if not spelt or not _UNIT.fullmatch(spelt):
         raise ValueError(f"unknown unit {shown(unit)}")
+    if (spelt, aim) in USUAL:
+        return USUAL[spelt, aim]
     if any(_OFTEN.search(a) and _TURNING.search(b) for a, b in ((spelt, aim), (aim, spelt))):
         raise ValueError(f"{unit}: of a frequency and a speed, one counts turns and the other radians")
     units = _registry()
