@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from passiflex.lazy import lazy_names
+from passiflex.lazy import lazy_names as _lazy_names
 from passiflex.version import __version__ as __version__
 
 if TYPE_CHECKING:
@@ -65,4 +65,4 @@ _ROOMS = {
 }
 
 
-__getattr__, __dir__ = lazy_names("passiflex", _ROOMS)
+__getattr__, __dir__ = _lazy_names("passiflex", _ROOMS)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from passiflex.lazy import lazy_names
+from passiflex.lazy import lazy_names as _lazy_names
 
 if TYPE_CHECKING:
     from passiflex.control.damping_design import damping_from_ratio as damping_from_ratio
@@ -49,4 +49,4 @@ _HOMES = {
     "shaped_system": "systems",
 }
 
-__getattr__, __dir__ = lazy_names("passiflex.control", _HOMES)
+__getattr__, __dir__ = _lazy_names("passiflex.control", _HOMES)

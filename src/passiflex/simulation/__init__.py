@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from passiflex.lazy import lazy_names
+from passiflex.lazy import lazy_names as _lazy_names
 
 if TYPE_CHECKING:
     from passiflex.simulation.closed_loop import ClosedLoop as ClosedLoop
@@ -39,7 +39,7 @@ _HOMES = {
     "simulate_problem": "through_time",
 }
 
-__getattr__, __dir__ = lazy_names("passiflex.simulation", _HOMES)
+__getattr__, __dir__ = _lazy_names("passiflex.simulation", _HOMES)
 
 
 def simulate(scenario: Scenario | Mapping[str, Any] | str | Path) -> Run:
