@@ -239,6 +239,17 @@ def test_runs_that_the_campaign_did_not_write_stay(tmp_path: Path) -> None:
     assert (tmp_path / "runs" / first.name).read_text() == "of before"
 
 
+def test_a_file_in_the_place_of_a_run_is_neither_taken_for_it_nor_written_over(tmp_path: Path) -> None:
+    c = campaign(samples=5, keep={"worst": 1, "by": "margin"})
+    (written,) = run_campaign(c, tmp_path / "there", workers=0).runs
+    mine = tmp_path / "out" / "runs" / written.name
+    mine.parent.mkdir(parents=True)
+    mine.write_text("mine")
+    with pytest.raises(FolderError, match=r"is none that this campaign wrote; .*another folder"):
+        run_campaign(c, tmp_path / "out", workers=0)
+    assert mine.read_text() == "mine"
+
+
 def has_numbers(run: Run, results: Results, sample: int) -> bool:
     """Return whether a run gives the row of a sample, to the last bit."""
     scenario = sample_scenario(results.campaign, sample)

@@ -23,15 +23,16 @@ from passiflex.campaigns.evaluate import (
 from passiflex.campaigns.possible import require_possible
 from passiflex.campaigns.ranking import worst_first
 from passiflex.campaigns.same_robot import marked, robot_digest
-from passiflex.errors import NameUnknownError, ValueRangeError
+from passiflex.campaigns.samples import sample_scenario
+from passiflex.errors import NameUnknownError, PassiflexError, ValueRangeError
 from passiflex.native import find_compiler
 from passiflex.pieces.cluster import Cluster
 from passiflex.pieces.engines import Engine, InProcess, LocalProcesses
-from passiflex.pieces.manifest import load_manifest
+from passiflex.pieces.manifest import FolderError, load_manifest
 from passiflex.pieces.run_pieces import Progress, run_pieces
 from passiflex.pieces.store import Store, open_store
 from passiflex.pieces.stored_rows import read_blocks, read_rows
-from passiflex.simulation import resolve
+from passiflex.simulation import Run, resolve
 from passiflex.simulation.admissible import require_stable
 from passiflex.simulation.batch import lane_loop
 from passiflex.texts.yaml_tree import read_back
@@ -80,7 +81,9 @@ class Results:
         """
         folder = Path(folder)
         campaign = parse_campaign(load_manifest(folder).campaign, source=str(folder))
-        found, kept = cls(folder, campaign), set((folder / RUNS).glob("sample_*.nc"))
+        own = load_manifest(folder).runs  # folders of before do not say
+        there = (folder / RUNS).glob("sample_*.nc")
+        found, kept = cls(folder, campaign), {path for path in there if not own or path.name in own}
         if not kept or campaign.keep.by is None:
             return found
         ranked = [_run_file(folder, i) for i in worst(found, campaign.keep.by, campaign.samples)]
@@ -154,8 +157,14 @@ def _keep_worst(results: Results, store: Store) -> tuple[Path, ...]:
     if keep.by is None:
         return ()
     paths = {i: _run_file(results.folder, i) for i in worst(results, keep.by, keep.worst)}
+    own = set(store.manifest.runs)
+    for i, path in paths.items():
+        if path.exists() and path.name not in own and not _is_run_of(path, results.campaign, i):
+            raise FolderError(
+                f"{path} is none that this campaign wrote", try_="another folder, or move it away"
+            )
     missing = {i: path for i, path in paths.items() if not path.exists()}
-    written = {*store.manifest.runs, *(path.name for path in missing.values())}
+    written = {*own, *(path.name for path in missing.values())}
     store.own_runs(written)
     for i, path in missing.items():
         run_sample(results.campaign, i).save(path)
@@ -164,6 +173,16 @@ def _keep_worst(results: Results, store: Store) -> tuple[Path, ...]:
         (results.folder / RUNS / name).unlink(missing_ok=True)
     store.own_runs(written - others)
     return tuple(paths.values())
+
+
+def _is_run_of(path: Path, campaign: Campaign, sample: int) -> bool:
+    """Return whether a file is the run of a sample: one of before, when folders did not say which are theirs."""
+    try:
+        run = Run.load(path)
+    except PassiflexError:
+        return False
+    wanted = resolve(sample_scenario(campaign, sample))
+    return run.name == wanted.name and run.data.attrs.get("configuration") == wanted.configuration
 
 
 def _run_file(folder: Path, sample: int) -> Path:

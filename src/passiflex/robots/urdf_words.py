@@ -63,7 +63,8 @@ def refuse_unread(element: ET.Element, where: str, absent: Sequence[str]) -> Non
         if found := [name for name in meant if name in absent]:
             what = f"{where}: {shape} cannot be read"
             needs = f"{' or '.join(_written(element.tag, name) for name in absent)}, if anything"
-            raise RobotError(what, needs=needs, try_=_written(element.tag, found[0]))
+            turned = ", the number that was first as the last" if word == "quat_wxyz" else ""
+            raise RobotError(what, needs=needs, try_=_written(element.tag, found[0]) + turned)
 
 
 def refuse_misspelt(root: ET.Element, source: str) -> None:
