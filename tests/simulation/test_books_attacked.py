@@ -13,7 +13,7 @@ import yaml
 from passiflex.errors import PassiflexError, UnstableLoopError
 from passiflex.passivity import audit, overclaimed
 from passiflex.simulation import parse_scenario, resolve, simulate_problem
-from passiflex.simulation.cautions import cautions
+from passiflex.simulation.book_cautions import book_cautions
 
 RUNS = 60
 """Of the test; `python tests/simulation/test_books_attacked.py 2000 [SEED]` has as many as it is told."""
@@ -24,7 +24,7 @@ SMALL = 1e-3
 
 
 class Attacked(NamedTuple):
-    """What became of a case: refused, or how far beyond the bound, the margin, the verdict, and what was warned of."""
+    """What became of a case: refused, or how far beyond the bound, the margin, and what was said of its books."""
 
     fate: str
     beyond: float = 0.0
@@ -97,7 +97,7 @@ def attacked(data: dict[str, Any]) -> Attacked:
     """Return what becomes of a case."""
     try:
         problem = resolve(parse_scenario(yaml.safe_dump(data)))
-        warned = cautions(problem)
+        warned = book_cautions(problem)
         run = simulate_problem(problem)
     except UnstableLoopError:
         return Attacked("refused")

@@ -66,7 +66,7 @@ def modes(ratio: float, posture: np.ndarray = POSTURE, **law: Any) -> np.ndarray
 @pytest.mark.parametrize("ratio", [0.3, 0.7, 0.9])
 def test_every_mode_has_the_ratio_whatever_the_motors(shaped_inertia: float, ratio: float) -> None:
     found = modes(ratio, shaped_inertia={"ratio": shaped_inertia})
-    np.testing.assert_allclose(found, ratio, rtol=0, atol=0.015)
+    np.testing.assert_allclose(found, ratio, rtol=0, atol=0.0101)
 
 
 def case(rng: np.random.Generator) -> dict[str, Any] | None:
@@ -82,7 +82,7 @@ def case(rng: np.random.Generator) -> dict[str, Any] | None:
         "shaped_inertia": {"ratio": float(np.exp(rng.uniform(np.log(0.01), 0)))},
         "shaped_stiffness": {"ratio": float(rng.choice([1, rng.uniform(0.8, 2)]))},
         "stiffness": {"translation": float(rng.uniform(100, 1500)), "rotation": float(rng.uniform(10, 100))},
-        "null_space_damping": float(rng.uniform(1, 10)),
+        "null_space_damping": float(rng.choice([0, rng.uniform(1, 10)])),
     }
 
 

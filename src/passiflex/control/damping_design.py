@@ -13,6 +13,8 @@ from passiflex.errors import ValueRangeError
 
 NEAR, ROUNDS = 0.01, 20
 """How near to the wanted ratio every mode is brought, and the corrections at most."""
+UNSEEN = 1e-3
+"""Share of the largest motion of the task below which a mode is a self-motion."""
 BOLD = 0.8
 """Share of a correction that is made at once, in the logarithm."""
 
@@ -96,9 +98,11 @@ def _ratios(
     masses = scipy.linalg.block_diag(arm.mass_matrix, np.diag(arm.motor_inertia))
     lower = -np.linalg.solve(masses, np.hstack([springs, dampers]))
     poles, vectors = np.linalg.eig(np.vstack([np.hstack([np.zeros((2 * n, 2 * n)), np.eye(2 * n)]), lower]))
-    swinging = np.flatnonzero(poles.imag > 0)
+    turned, reach = vectors[n : 2 * n], np.linalg.norm(J, 2)
+    seen = np.linalg.norm(J @ turned, axis=0) > UNSEEN * reach * np.linalg.norm(turned, axis=0)
+    swinging = np.flatnonzero((poles.imag > 0) & seen)  # an undamped self-motion is near 0, with any sign
     slowest = swinging[np.argsort(np.abs(poles[swinging]))][: len(Q)]
-    moved: NDArray[Any] = np.abs(Q.T @ J @ vectors[n : 2 * n, slowest])
+    moved: NDArray[Any] = np.abs(Q.T @ J @ turned[:, slowest])
     alike = moved / np.maximum(np.linalg.norm(moved, axis=0), 1e-300)
     out = np.full(len(Q), np.nan)
     for _ in slowest:

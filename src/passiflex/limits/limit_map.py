@@ -9,10 +9,10 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from threadpoolctl import threadpool_limits
 
 from passiflex.control.law import ImpedanceLaw
 from passiflex.limits.confirmation import Confirmation, confirm
+from passiflex.limits.one_thread import on_one_thread
 from passiflex.limits.own_margin import OwnMargin, own_margin
 from passiflex.limits.planes import (
     Interval,
@@ -116,7 +116,7 @@ class LimitMap:
         return int(np.argmin(np.abs(self.delays - periods)))
 
 
-@threadpool_limits.wrap(limits=1)  # threads that wait for one another cost more than small matrices
+@on_one_thread
 def limit_map(
     subject: Subject,
     rate: float | str | None = None,

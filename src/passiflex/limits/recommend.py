@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 import yaml
 from numpy.typing import ArrayLike, NDArray
-from threadpoolctl import threadpool_limits
 
 from passiflex.control.task import AbstractTask, PoseTask, PositionTask
 from passiflex.errors import NameUnknownError, SizeError, ValueRangeError
 from passiflex.limits.attempt import Attempt, Report
 from passiflex.limits.inertia_search import FLOORS, MOST, HeavierError, InertiaSearch, UnattainableError
+from passiflex.limits.one_thread import on_one_thread
 from passiflex.limits.recommendation import Recommendation
 from passiflex.limits.subject import DELAY, RATE, number
 from passiflex.limits.workspace import workspace_postures
@@ -111,7 +111,7 @@ def recommend(
     )
 
 
-@threadpool_limits.wrap(limits=1)  # threads that wait for one another cost more than small matrices
+@on_one_thread
 def recommend_gains(
     scenario: str,
     robot: FlexibleJointRobot,

@@ -104,9 +104,10 @@ class LawSlope:
 
     def _at_rest(self, gains: Gains, elapsed: float) -> AtRest:
         """Return where the law rests, which is asked again and again for gains that change nothing there."""
-        key = elapsed, hashable({name: gains[name] for name in AT_REST if name in gains})
+        deciding = {name: gains[name] for name in AT_REST if name in gains}  # it is told of no other
+        key = elapsed, hashable(deciding)
         if self._rest is None or self._rest[0] != key:
-            self._rest = key, loop_at_rest(self.problem, self.compiled.loop, gains, elapsed, self.at)
+            self._rest = key, loop_at_rest(self.problem, self.compiled.loop, deciding, elapsed, self.at)
         return self._rest[1]
 
 
