@@ -286,7 +286,9 @@ def wait_for(condition):
         time.sleep(0.01)
 
 
-def test_a_builder_that_is_lost_is_one_line(cache, monkeypatch):
+@pytest.mark.parametrize("length", [1, 200_000], ids=["heard", "gone while it is told"])
+def test_a_builder_that_is_lost_is_one_line(cache, monkeypatch, length):
+    """A pipe holds 64 kB: a longer text cannot be written to a process that is gone."""
     monkeypatch.setattr(compiler.builder, "__file__", "/nowhere/builder.py")
     with pytest.raises(CompilerError, match=r"the process that runs the compiler ended; got .*No such file"):
-        compile_source(SOURCE + "/* not in the cache */")
+        compile_source(SOURCE + f"/* {'x' * length} */")

@@ -16,6 +16,7 @@ import shlex
 import shutil
 import subprocess
 import sys
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -96,9 +97,12 @@ def _asked(request: dict[str, Any]) -> dict[str, Any]:
     ) as process:
         assert process.stdin is not None
         assert process.stdout is not None
-        process.stdin.write(json.dumps(request).encode() + b"\n")
-        process.stdin.flush()  # and it stays open: its end is the end of this process
+        with suppress(BrokenPipeError):  # it has ended already, and has said why
+            process.stdin.write(json.dumps(request).encode() + b"\n")
+            process.stdin.flush()  # and it stays open: its end is the end of this process
         said = process.stdout.read()
+        with suppress(BrokenPipeError):
+            process.stdin.close()
     try:
         return dict(json.loads(said))
     except ValueError as error:
