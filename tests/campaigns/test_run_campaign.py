@@ -250,6 +250,14 @@ def test_a_file_in_the_place_of_a_run_is_neither_taken_for_it_nor_written_over(t
     assert mine.read_text() == "mine"
 
 
+@pytest.mark.parametrize("name", ["statistics.json", "page.png", "page.pdf"])
+def test_a_file_where_the_page_goes_is_refused_before_the_work(tmp_path: Path, name: str) -> None:
+    (tmp_path / name).write_text("mine")
+    with pytest.raises(FolderError, match=rf"{name} is none that this campaign wrote; try another folder"):
+        run_campaign(campaign(samples=5), tmp_path, workers=0)
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {name: "mine"}
+
+
 def has_numbers(run: Run, results: Results, sample: int) -> bool:
     """Return whether a run gives the row of a sample, to the last bit."""
     scenario = sample_scenario(results.campaign, sample)

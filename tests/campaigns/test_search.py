@@ -16,11 +16,12 @@ from passiflex.campaigns import Campaign, load_campaign
 from passiflex.campaigns import search as room
 from passiflex.campaigns.box import EDGE, Box
 from passiflex.campaigns.evaluate import evaluate_problems
-from passiflex.campaigns.found import Found
+from passiflex.campaigns.found import Found, require_place
 from passiflex.campaigns.measures import MEASURES
 from passiflex.campaigns.search import DISTINCT, search
 from passiflex.cli.campaign_tables import found_table
 from passiflex.errors import NameUnknownError, ValueRangeError
+from passiflex.files import OutputError
 from passiflex.simulation import load_scenario, resolve, simulate
 from passiflex.simulation.scenario import Scenario
 from worlds import merged
@@ -251,11 +252,26 @@ def test_a_search_removes_what_its_record_names_and_nothing_else(tmp_path: Path)
 @pytest.mark.parametrize(
     "content", ["", "{", "[]", '{"cases": 1}', '{"cases": [1]}', '{"cases": [{}]}', "[" * 10**5]
 )
-def test_a_record_that_is_none_removes_nothing(tmp_path: Path, content: str) -> None:
-    (tmp_path / "search.json").write_text(content)
-    (tmp_path / "worst_2.yaml").write_text("mine")
-    replace(searched("torque_peak", evaluations=16), cases=()).save(tmp_path)
-    assert (tmp_path / "worst_2.yaml").read_text() == "mine"
+def test_a_record_that_is_none_is_somebodys_own(tmp_path: Path, content: str) -> None:
+    mine = {"search.json": content, "worst_2.yaml": "mine"}
+    for name, text in mine.items():
+        (tmp_path / name).write_text(text)
+    with pytest.raises(OutputError, match=r"search.json is none that a search wrote; try another folder"):
+        replace(searched("torque_peak", evaluations=16), cases=()).save(tmp_path)
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == mine
+
+
+def test_a_scenario_that_no_search_wrote_is_not_written_over(tmp_path: Path) -> None:
+    (tmp_path / "worst_1.yaml").symlink_to(tmp_path / "nowhere")
+    with pytest.raises(OutputError, match=r"worst_1.yaml is none that a search wrote"):
+        require_place(tmp_path, 1)
+    found = searched("torque_peak", evaluations=16)
+    with pytest.raises(OutputError, match=r"worst_1.yaml is none that a search wrote"):
+        found.save(tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == ["worst_1.yaml"]
+    (tmp_path / "worst_1.yaml").unlink()
+    found.save(tmp_path)
+    assert require_place(tmp_path, 9) == {"search.json", *(f"worst_{i}.yaml" for i in (1, 2, 3))}
 
 
 def test_a_robot_from_a_file_is_found_from_anywhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -195,6 +195,16 @@ def test_nothing_is_doubted_of_the_catalogue(name: str) -> None:
             "8e6",
             "joint_stiffness of 'shoulder' is very hard: 8e\\+06 lets its links swing at 3.8e\\+02 Hz, and those",
         ),
+        (
+            "8000",
+            "[8000, 8]",
+            "joint_stiffness of 'elbow' does not fit the motor: the largest torque, 80, bends 'elbow' by 10 rad; "
+            "is one of them 1000 times off",
+        ),
+        ("8000", "[8000, 8e6]", "joint_stiffness of 'elbow' does not fit the motor: .* by 1e-05 rad; is one of"),
+        ("8000", "[8e8, 8000]", "joint_stiffness of 'shoulder' does not fit the motor: .* by 1e-07 rad; is one"),
+        ("8000", "[8000, 1e308]", "joint_stiffness of 'elbow' does not fit the motor: .* by 8e-307 rad; is one"),
+        ("8000", "[400, 790000]", None),
         ("value: 80,", "value: [80, 81],", None),
         (
             "value: 80,",

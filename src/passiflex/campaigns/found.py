@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,7 +13,7 @@ from typing import Any, NamedTuple
 from passiflex.campaigns.measures import MEASURES
 from passiflex.campaigns.samples import Values
 from passiflex.errors import UnstableLoopError
-from passiflex.files import read_json, read_regular, whole_file
+from passiflex.files import OutputError, read_json, read_regular, require_writable, whole_file
 from passiflex.simulation.admissible import require_stable
 from passiflex.simulation.problem import Problem
 from passiflex.simulation.run import package_version, source_commit
@@ -97,28 +98,41 @@ class Found:
         Raises
         ------
         OutputError
-            If they cannot be written.
+            If they cannot be written, or somebody else's file has such a name.
         """
-        before = _files_of_before(Path(folder) / NAME)
-        texts = {_file(i): case.scenario.to_yaml() for i, case in enumerate(self.cases)}
-        texts[NAME] = json.dumps(self.to_dict(), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+        before = require_place(folder, len(self.cases))
+        record = json.dumps(self.to_dict(), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+        texts = {NAME: record}  # first: what follows is known to be ours, also if this process is killed
+        texts |= {_file(i): case.scenario.to_yaml() for i, case in enumerate(self.cases)}
         paths = [Path(folder) / name for name in texts]
         for path, text in zip(paths, texts.values(), strict=True):
             with whole_file(path) as temporary:
                 temporary.write_text(text, encoding="utf-8")
         for other in {Path(folder) / name for name in before} - set(paths):
             other.unlink(missing_ok=True)
-        return paths
+        return [*paths[1:], paths[0]]
+
+
+def require_place(folder: str | Path, cases: int) -> set[str]:
+    """Raise OutputError unless a search can be kept in a folder; return what an earlier one has there, by name."""
+    folder = Path(folder)
+    require_writable(folder)
+    before = _files_of_before(folder / NAME)
+    for name in {NAME, *map(_file, range(cases))} - before:
+        if os.path.lexists(folder / name):
+            what = f"{folder / name} is none that a search wrote"
+            raise OutputError(what, try_="another folder, or move it away")
+    return before
 
 
 def _files_of_before(path: Path) -> set[str]:
-    """Return the names of the scenarios that a record lists; none if it cannot be read, or is no record."""
+    """Return the names of a record and of the scenarios that it lists; none if it cannot be read, or is no record."""
     try:
         cases = read_json(read_regular(path, MOST_BYTES).decode("utf-8"))["cases"]
         names = {str(case["scenario"]) for case in cases}
     except (OSError, ValueError, LookupError, TypeError):
         return set()
-    return {name for name in names if re.fullmatch(r"worst_\d+\.yaml", name)}
+    return {path.name, *(name for name in names if re.fullmatch(r"worst_\d+\.yaml", name))}
 
 
 def case_scenario(scenario: Scenario, problem: Problem, rank: int) -> Scenario:

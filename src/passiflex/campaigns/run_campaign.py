@@ -39,6 +39,8 @@ from passiflex.texts.yaml_tree import read_back
 
 RUNS = "runs"
 """Folder of the worst samples' full runs, within that of the results."""
+STATISTICS, PAGE = "statistics.json", ("page.png", "page.pdf")
+"""Files that the command makes of the rows, beside them."""
 
 
 @dataclass(frozen=True)
@@ -124,7 +126,10 @@ def run_campaign(
         robot = _ready(campaign)
         prefix = campaign.sampling != "latin_hypercube"
         text, identity = marked(campaign.to_yaml(), robot), marked(_identity(campaign), robot)
-        with open_store(folder, text, campaign.samples, extends=prefix, identity=identity) as store:
+        beside = (STATISTICS, *PAGE)
+        with open_store(
+            folder, text, campaign.samples, extends=prefix, identity=identity, beside=beside
+        ) as store:
             run_pieces(store, evaluate_samples, engine, on_progress)
             results = Results(Path(folder), campaign)
             return Results(results.folder, campaign, _keep_worst(results, store))

@@ -85,13 +85,13 @@ def search(
 ) -> int:
     """Look for the worst case within the bounds of a campaign's parameters; what is found can be simulated."""
     from passiflex.campaigns import load_campaign
+    from passiflex.campaigns.found import require_place
     from passiflex.campaigns.search import search as search_worst
     from passiflex.cli.campaign_tables import found_table
-    from passiflex.files import require_writable
 
     with timed():
         read = load_campaign(campaign)
-        require_writable(out)
+        require_place(out, keep)
         with progress_lines() as report:
             found = search_worst(read, measure, evaluations=evaluations, keep=keep, seed=seed, report=report)
         console.print(found_table(found))
@@ -103,22 +103,24 @@ def search(
 def _sum_up(results: Results) -> None:
     """Write the statistics and the page of figures beside the rows, then print them: a closed pipe loses nothing."""
     from passiflex.campaigns.page import ideal_along, page
+    from passiflex.campaigns.run_campaign import PAGE, STATISTICS
     from passiflex.campaigns.statistics import statistics
     from passiflex.cli.campaign_tables import statistics_tables
     from passiflex.files import whole_file
     from passiflex.plotting.campaign import draw_campaign
     from passiflex.plotting.figures import Curve, save_figure
 
+    folder = results.folder
     rows = results.narrow_rows()
     found = statistics(results.campaign, rows)
-    with whole_file(results.folder / "statistics.json") as temporary:
+    with whole_file(folder / STATISTICS) as temporary:
         temporary.write_text(json.dumps(found.to_dict(), indent=2, allow_nan=False) + "\n", encoding="utf-8")
     ideal = ideal_along(results.campaign)
     drawing = draw_campaign(
         page(results.campaign, rows, found, results.responses()), {"msd": Curve(*ideal)} if ideal else {}
     )
-    written = [results.folder / "samples.parquet", results.folder / "statistics.json"]
-    written += [*save_figure(drawing, results.folder / "page"), *results.runs]
+    written = [folder / "samples.parquet", folder / STATISTICS]
+    written += [*save_figure(drawing, (folder / PAGE[0]).with_suffix("")), *results.runs]
     for table in statistics_tables(found):
         console.print(table)
     for path in written:

@@ -44,6 +44,7 @@ def open_store(
     piece: int = PIECE,
     extends: bool = False,
     identity: str | None = None,
+    beside: Collection[str] = (),
 ) -> Iterator[Store]:
     """Give the store of a campaign, alone in its folder, to start it or to go on with it.
 
@@ -57,11 +58,12 @@ def open_store(
     extends: Whether the first samples of a campaign of more are the samples of this one.
     identity: What must be the same to go on, if that is not the text itself: the resolved configuration
         without the number of samples.
+    beside: Names of the files that will be made of the rows, in the same folder.
 
     Raises
     ------
     FolderError
-        If the folder holds another campaign.
+        If the folder holds another campaign, or in a new one files of those names.
     FolderInUseError
         If another process works in it.
     OutputError
@@ -73,17 +75,15 @@ def open_store(
         )
     folder = Path(folder)
     require_writable(folder)
+    _require_no_others(folder, beside)  # first, so that nothing of ours is left in a folder that is not
     with locked(folder) as is_ours:
+        _require_no_others(folder, beside)
         identity = campaign if identity is None else identity
-        if (folder / NAME).exists():
-            before = load_manifest(folder)
+        before = load_manifest(folder) if (folder / NAME).exists() else None
+        if before:
             manifest = before.continued(campaign, identity, samples, extends)
-        elif (folder / ALL).exists() or (folder / PIECES).exists():
-            raise FolderError(
-                f"{folder} holds rows of an unknown campaign", got=f"no {NAME}", try_="another folder"
-            )
         else:
-            before, manifest = None, new_manifest(campaign, identity, samples, piece)
+            manifest = new_manifest(campaign, identity, samples, piece)
         _sweep(folder)
         if manifest != before:
             manifest.save(folder)
@@ -231,6 +231,20 @@ class Store:
         self._schema = unified([self._schema, schema] if self._schema else [schema])
         self.verdicts.update(verdicts)
         return True
+
+
+def _require_no_others(folder: Path, beside: Collection[str]) -> None:
+    """Raise FolderError if a folder without a campaign holds files that a campaign would take for its own."""
+    if (folder / NAME).exists():
+        return
+    if (folder / ALL).exists() or (folder / PIECES).exists():
+        raise FolderError(
+            f"{folder} holds rows of an unknown campaign", got=f"no {NAME}", try_="another folder"
+        )
+    for name in beside:
+        if os.path.lexists(folder / name):
+            what = f"{folder / name} is none that this campaign wrote"
+            raise FolderError(what, try_="another folder, or move it away")
 
 
 def _sweep(folder: Path) -> None:

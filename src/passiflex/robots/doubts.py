@@ -19,6 +19,8 @@ MOTOR_SIDE = 1 / 200
 """Share of what a joint moves below which a motor's inertia looks as if its gear were forgotten: of 1:15 or more."""
 SLOWEST, FASTEST = 0.7, 150.0
 """[Hz] between which the slowest joint spring of an arm carries its links; from 1 to 100 is what arms have."""
+BENDING = {"revolute": (1e-4, 1.0, "rad"), "prismatic": (1e-7, 0.02, "m")}
+"""Between which the largest torque bends a joint: 0.003 to 0.06 rad, and 1e-5 to 1e-2 m, are what arms have."""
 ROUNDED = 0.01
 """Share by which a limit may go beyond that of the URDF: it may have been rounded."""
 
@@ -35,7 +37,18 @@ def doubts(robot: Any) -> Iterator[str]:
             f"{robot.motor_inertia[i]:.3g} against {moved[i]:.3g} {unit} at {joints[i].name!r}; "
             "it counts behind the gear, as rotor inertia times the square of the ratio"
         )
-    swing = np.sqrt(robot.stiffness / moved) / (2 * np.pi)
+    yield from _springs(robot, moved)
+    yield from _contradictions(robot)
+
+
+def _springs(robot: Any, moved: Array) -> Iterator[str]:
+    """Yield a sentence on a joint stiffness that does not fit what the joint moves, or what its motor can do.
+
+    Links that weigh little swing fast, so that only the slowest spring can be too hard by its swing; by what its
+    motor's largest torque bends it, each can.
+    """
+    joints = robot.chain.joints
+    swing = np.sqrt(robot.stiffness) / np.sqrt(moved) / (2 * np.pi)  # of each factor: the ratio may overflow
     slowest = int(np.argmin(swing))
     if not SLOWEST <= swing[slowest] <= FASTEST:
         soft = swing[slowest] < SLOWEST
@@ -44,7 +57,17 @@ def doubts(robot: Any) -> Iterator[str]:
             f"{robot.stiffness[slowest]:.3g} lets its links swing at {swing[slowest]:.2g} Hz"
             f"{'' if soft else ', and those of all others faster'}; is it 1000 times off?"
         )
-    yield from _contradictions(robot)
+        return
+    least, most, units = zip(*(BENDING[j.kind] for j in joints), strict=True)
+    bent = robot.torque_limit / robot.stiffness
+    odd = np.flatnonzero(np.isfinite(bent) & ((bent < least) | (bent > most)))
+    if odd.size:
+        i = int(odd[0])
+        yield (
+            f"joint_stiffness of {listed(repr(joints[k].name) for k in odd)} does not fit the motor: the largest "
+            f"torque, {robot.torque_limit[i]:.3g}, bends {joints[i].name!r} by {bent[i]:.2g} {units[i]}; "
+            "is one of them 1000 times off?"
+        )
 
 
 def moved_inertia(chain: SerialChain) -> Array:
