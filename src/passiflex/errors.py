@@ -5,6 +5,11 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable
 
+_LONGEST = 4000
+"""Characters of one part of a message: what compilers say fits, a name of a megabyte does not."""
+_LONGEST_NAME = 200
+"""Characters of a word for which a near one is looked for; the search is quadratic."""
+
 
 class PassiflexError(Exception):
     """Base of all errors that a wrong use of the package raises.
@@ -26,7 +31,7 @@ class PassiflexError(Exception):
             parts.append(f"needs {needs}")
         if try_:
             parts.append(f"try {try_}")
-        super().__init__("; ".join(parts))
+        super().__init__("; ".join(map(_bearable, parts)))
 
 
 class RobotError(PassiflexError):
@@ -48,7 +53,7 @@ class NameUnknownError(PassiflexError):
 
     def __init__(self, kind: str, got: str, known: Iterable[str]):
         names = sorted(known)
-        near = nearest(got, names)
+        near = nearest(str(got), names)
         super().__init__(
             f"unknown {kind}",
             got=repr(got),
@@ -67,7 +72,8 @@ class ScenarioError(PassiflexError):
     def __init__(self, source: str, mistakes: list[str]):
         self.mistakes = mistakes
         super().__init__(
-            f"{source}: {len(mistakes)} mistake{'s' * (len(mistakes) != 1)}\n  " + "\n  ".join(mistakes)
+            f"{source}: {len(mistakes)} mistake{'s' * (len(mistakes) != 1)}\n  "
+            + "\n  ".join(map(_bearable, mistakes))
         )
 
 
@@ -76,6 +82,19 @@ class FrozenError(PassiflexError):
 
     def __init__(self, kind: str, got: str, try_: str):
         super().__init__(f"{kind} is frozen", got=got, needs="a changed copy", try_=try_)
+
+
+class ArgumentError(PassiflexError):
+    """An argument is of another kind than what a function takes."""
+
+    def __init__(self, got: object, needs: str, try_: str | None = None):
+        shown = repr(got)
+        super().__init__(
+            "wrong kind of argument",
+            got=shown if len(shown) <= 60 else f"{shown[:57]}...",
+            needs=needs,
+            try_=try_,
+        )
 
 
 class SimulationError(PassiflexError):
@@ -92,7 +111,13 @@ class PassiflexWarning(UserWarning):
 
 def nearest(name: str, known: Iterable[str]) -> list[str]:
     """Return up to three known names that are close to `name`, best first."""
-    return difflib.get_close_matches(name, list(known), n=3, cutoff=0.5)
+    return difflib.get_close_matches(name, list(known), n=3, cutoff=0.5) if len(name) <= _LONGEST_NAME else []
+
+
+def _bearable(part: str) -> str:
+    """Return a part of a message, without its middle if it is very long."""
+    half = _LONGEST // 2
+    return part if len(part) <= _LONGEST else f"{part[:half]} ... {part[-half:]}"
 
 
 class UnstableLoopError(PassiflexError):

@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NoReturn
 
-from passiflex.errors import PassiflexError
+from passiflex.errors import ArgumentError, PassiflexError
 
 _LONGEST_STEM = 40
 """Characters of a file's name that its temporary has in its own, which may not be too long."""
@@ -21,6 +21,19 @@ _LONGEST_STEM = 40
 
 class OutputError(PassiflexError):
     """A result cannot be written."""
+
+
+def as_path(given: object, of: str) -> Path:
+    """Return the path that was given.
+
+    Raises
+    ------
+    ArgumentError
+        If it is none; `of` says of what it should be one.
+    """
+    if isinstance(given, str | os.PathLike) and isinstance(name := os.fspath(given), str) and name.strip():
+        return Path(name)
+    raise ArgumentError(given, f"the path of {of}")
 
 
 @contextmanager

@@ -296,7 +296,7 @@ def test_every_command_has_help(shell: Shell, command: str, words: list[str]) ->
     ("arguments", "message"),
     [
         (["audit", "--loud", "run.nc"], "Unknown option: --loud."),
-        (["audit"], 'Command "audit" parameter --run requires an argument.'),
+        (["audit"], 'Command "audit" parameter RUN requires an argument.'),
         (["simulate", "s.yaml"], 'Command "simulate" parameter --out requires an argument.'),
         (["robots", "all"], "Unused Tokens: ['all']."),
     ],

@@ -117,8 +117,18 @@ def test_what_is_no_file_of_its_own_is_not_opened(cache, tmp_path, there):
         again = compile_source(SOURCE)
     assert compile_source(SOURCE) == again  # a second warning would be an error here
     assert len(warned) == 1
-    assert (again == path) == (there != "folder")
+    assert (again == path) == (there != "folder")  # which is somebody's: what is in it is left alone
+    assert again.parent == path.parent
     assert answer(again) == 42.0
+
+
+def test_an_interpreter_that_cannot_be_started_is_one_line(cache, monkeypatch):
+    for wrong in (str(cache.parent / "nowhere"), str(cache.parent), ""):
+        monkeypatch.setattr("sys.executable", wrong)
+        with pytest.raises(
+            CompilerError, match=r"^Python cannot be started for the process that runs the compiler; got"
+        ):
+            compile_source(SOURCE)
 
 
 @pytest.mark.parametrize("mode", [0o777, 0o1777, 0o775, 0o722])

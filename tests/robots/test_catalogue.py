@@ -101,7 +101,7 @@ GOOD = {
     "urdf": "slider.urdf",
     "end_effector": "rod",
     "source": "assumed",
-    "joint_stiffness": {"value": [2.0, 30.0], "unit": ["N/mm", "N m/deg"], "source": "assumed"},
+    "joint_stiffness": {"value": [2000.0, 30.0], "unit": ["N/mm", "N m/deg"], "source": "assumed"},
     "joint_damping": {"value": 4, "unit": ["N s/m", "N m s/rad"], "source": "assumed"},
     "motor_inertia": {"value": [1, 5e3], "unit": ["kg", "kg cm^2"], "source": "assumed"},
     "torque_limit": {"value": [1, 1], "unit": ["kN", "N m"], "source": "assumed"},
@@ -126,7 +126,7 @@ def write(tmp_path: Path):
 
 def test_mixed_units_become_si(write):
     d = read_description(write())
-    np.testing.assert_allclose(d.stiffness, [2000, 30 * 180 / np.pi], rtol=1e-15)
+    np.testing.assert_allclose(d.stiffness, [2e6, 30 * 180 / np.pi], rtol=1e-15)
     np.testing.assert_allclose(d.damping, [4, 4])
     np.testing.assert_allclose(d.motor_inertia, [1, 0.5])
     np.testing.assert_allclose(d.torque_limit, [1000, 1])
@@ -194,7 +194,7 @@ WRONG = {
     ),
     "no source": (
         ("torque_limit", {"source": " "}),
-        r"has wrong entries; got line \d+, column 11, torque_limit.source: string should have at least 1 character",
+        r"has wrong entries; got line \d+, column 11, torque_limit.source: expected text; got",
     ),
     "words": (
         ("torque_limit", {"value": "strong", "unit": ["N", "N m"]}),

@@ -69,7 +69,15 @@ def write(tmp_path: Path):
         (K, K.replace("unit", "units"), "line 6, column 32, joint_stiffness.units: unknown name; try 'unit'"),
         (K, "8000", "line 6, column 18, joint_stiffness: needs a unit and a source; got 8000; try {value: 8000, unit: N m/rad, source: ...}"),
         (K, "[8000, 1000]", "line 6, column 18, joint_stiffness: needs a unit and a source; got \\[8000, 1000\\]"),
-        (K, "8000 N m/rad", "line 6, column 18, joint_stiffness: needs a unit and a source; got '8000 N m/rad'"),
+        (K, "8000 N m/rad", "line 6, column 18, joint_stiffness: needs a source; got '8000 N m/rad'; try {value: 8000 N m/rad, source: ...}"),
+        (K, "[8000 N m/rad, 5]", "line 6, column 18, joint_stiffness: needs a source; got \\['8000 N m/rad', 5\\]; try {value: \\['8000 N m/rad', 5\\], source: ...}"),
+        (K, "{value: 0x10, unit: N m/rad, source: a}", "expected N m/rad, one number; got {'value': '0x10', 'unit': 'N m/rad'} \\(not a number\\)"),
+        (K, "{value: 1_000, unit: N m/rad, source: a}", "got {'value': '1_000', 'unit': 'N m/rad'} \\(not a number\\)"),
+        (K, "{value: 1:30, unit: N m/rad, source: a}", "got {'value': '1:30', 'unit': 'N m/rad'} \\(not a number\\)"),
+        (K, "{value: 8 N m/rad, unit: N m/rad, source: a}", "\\(two units\\)"),
+        (K, "{value: 8000, unit: 5, source: a}", "joint_stiffness.unit: expected text, or one for each joint; got 5"),
+        (K, "{value: 8000, unit: [N m/rad, 5], source: a}", "joint_stiffness.unit: expected text, or one for each joint; got \\['N m/rad', 5\\]"),
+        ("urdf: two.urdf", 'urdf: ""', "line 3, column 7, urdf: expected text; got ''"),
         (K, "{value: 8000, source: a}", "line 6, column 26, joint_stiffness.value: needs a unit; got 8000; try unit: N m/rad"),
         (K, "{value: [8000, 1 kN m/rad], source: a}", "line 6, column 26, joint_stiffness.value: needs a unit; got \\[8000, '1 kN m/rad'\\]"),
         ("name: two", "name: 2001-99-99\nnmae: 3", "line 2, column 1, nmae: unknown name; try 'name'"),
@@ -84,7 +92,7 @@ def write(tmp_path: Path):
         ("N m s/rad", "N s/m", "line 7, column 33: entry joint_damping.unit does not fit revolute joint 1; got 'N s/m'; needs one of N m s/rad, N m s/deg"),
         ("rad/s", "Hz", "line 10, column 34: entry velocity_limit.unit does not fit revolute joint 1; got 'Hz'"),
         ("urdf: two.urdf", 'urdf: "two\\0.urdf"', "line 3, column 7: entry urdf: no such file"),
-        ("urdf: two.urdf", "urdf: ''", "line 3, column 7, urdf: string should have at least 1 character"),
+        ("urdf: two.urdf", "urdf: ''", "line 3, column 7, urdf: expected text; got"),
     ],
 )  # fmt: skip
 def test_a_mistake_is_at_its_line_and_column(write, old: str, new: str, message: str) -> None:
@@ -201,9 +209,21 @@ def test_nothing_is_doubted_of_the_catalogue(name: str) -> None:
             "joint_stiffness of 'elbow' does not fit the motor: the largest torque, 80, bends 'elbow' by 10 rad; "
             "is one of them 1000 times off",
         ),
-        ("8000", "[8000, 8e6]", "joint_stiffness of 'elbow' does not fit the motor: .* by 1e-05 rad; is one of"),
-        ("8000", "[8e8, 8000]", "joint_stiffness of 'shoulder' does not fit the motor: .* by 1e-07 rad; is one"),
-        ("8000", "[8000, 1e308]", "joint_stiffness of 'elbow' does not fit the motor: .* by 8e-307 rad; is one"),
+        (
+            "8000",
+            "[8000, 8e6]",
+            "joint_stiffness of 'elbow' does not fit the motor: .* by 1e-05 rad; is one of",
+        ),
+        (
+            "8000",
+            "[8e8, 8000]",
+            "joint_stiffness of 'shoulder' does not fit the motor: .* by 1e-07 rad; is one",
+        ),
+        (
+            "8000",
+            "[8000, 1e308]",
+            "joint_stiffness of 'elbow' does not fit the motor: .* by 8e-307 rad; is one",
+        ),
         ("8000", "[400, 790000]", None),
         ("value: 80,", "value: [80, 81],", None),
         (

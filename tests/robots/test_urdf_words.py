@@ -45,7 +45,7 @@ UNREAD = {
     '<axis x="0" y="1" z="0"/>': (AXIS, "joint 'hip': <axis x=...> cannot be read"),
     "<axis>0 1 0</axis>": (AXIS, "joint 'hip': the text '0 1 0' in <axis> cannot be read"),
     "<axis><xyz>0 1 0</xyz></axis>": (AXIS, "joint 'hip': <xyz> in <axis> cannot be read"),
-    '<Axis xyz="0 1 0"/>': (AXIS, "joint 'hip': <Axis> in <joint> cannot be read; needs <axis> or <mimic>, if anything; try <axis>"),
+    '<Axis xyz="0 1 0"/>': (AXIS, "joint 'hip': <Axis> in <joint> cannot be read; needs <axis>, if anything; try <axis>"),
     '<axes xyz="0 1 0"/>': (AXIS, "joint 'hip': <axes> in <joint> cannot be read"),
     f'{AXIS}<Mimic joint="ankle"/>': (AXIS, "joint 'hip': <Mimic> in <joint> cannot be read"),
     '<origin xyz="0 0 1" rot="0 0 1"/>': (ORIGIN, "joint 'hip': <origin rot=...> cannot be read; needs rpy=... or quat_xyzw=..., if anything; try rpy=..."),
@@ -53,7 +53,7 @@ UNREAD = {
     '<origin xyz="0 0 1" quat-xyzw="0 0 0 1"/>': (ORIGIN, "joint 'hip': <origin quat-xyzw=...> cannot be read; .*; try quat_xyzw=..."),
     '<origin position="0 0 1"/>': (ORIGIN, "joint 'hip': <origin position=...> cannot be read; .*; try xyz=..."),
     "<origin>0 0 1</origin>": (ORIGIN, "joint 'hip': the text '0 0 1' in <origin> cannot be read"),
-    "<pose>0 0 1 0 0 1</pose>": (ORIGIN, "joint 'hip': <pose> in <joint> cannot be read; needs <origin> or <mimic>, if anything; try <origin>"),
+    "<pose>0 0 1 0 0 1</pose>": (ORIGIN, "joint 'hip': <pose> in <joint> cannot be read; needs <origin>, if anything; try <origin>"),
     '<orgin xyz="0 0 1"/>': (ORIGIN, "joint 'hip': <orgin> in <joint> cannot be read"),
     '<origin xyz="0 0 1" rpy="0 0 57" units="deg"/>': (ORIGIN, "joint 'hip': <origin units=...> is not known to URDF; needs m and rad, and no such attribute"),
     '<origin xyz="0 0 1" rpy="0 0 1" quat_xyzw="0 0 0 1"/>': (ORIGIN, "joint 'hip': <origin quat_xyzw=...> stands beside rpy; needs one of them"),
@@ -103,6 +103,10 @@ def test_an_attribute_in_place_of_an_element_is_refused_where_that_is_absent() -
         (
             '<link name="foot"/>',
             '<link name="foot"/><material name="a"/><transmission/><loop_joint/><sensor/>',
+        ),
+        (
+            '<link name="foot"/>',
+            '<link name="foot"/><point/><linkage/><limit/><group/>',
         ),
     ],
 )
@@ -191,3 +195,20 @@ def test_a_chain_of_very_many_moving_joints_is_refused() -> None:
     )
     with pytest.raises(RobotError, match="the robot has too many moving joints; needs at most 100"):
         SerialChain.from_urdf(with_("</robot>", more + "</robot>"))
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ('type="revolute"', 'type="{}"'),
+        ('<parent link="base"/>', '<parent link="{}"/>'),
+        (AXIS, '<axis xyz="{}"/>'),
+        (AXIS, '<axis {}="1"/>'),
+        (ORIGIN, '<origin xyz="0 0 1" rpy="{}"/>'),
+        ('<mass value="2"/>', '<mass value="{}"/>'),
+    ],
+)
+def test_a_word_of_a_megabyte_is_not_repeated_whole(old: str, new: str) -> None:
+    with pytest.raises(RobotError) as error:
+        SerialChain.from_urdf(with_(old, new.format("x" * 10**6)))
+    assert len(str(error.value)) < 20_000

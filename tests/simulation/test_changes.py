@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import io
 import re
 from typing import Any
 
@@ -11,7 +12,7 @@ import pytest
 import yaml
 
 import passiflex as pf
-from passiflex.errors import FrozenError, PassiflexError, ScenarioError
+from passiflex.errors import ArgumentError, FrozenError, PassiflexError, ScenarioError
 from passiflex.simulation import Scenario, parse_scenario
 from passiflex.simulation.scenario import Force
 from worlds import PLAIN, PLANAR, merged
@@ -166,9 +167,30 @@ def test_frozen_is_an_error_of_ours_with_what_to_do() -> None:
     )
     with pytest.raises(FrozenError, match=r"^ImpedanceSettings is frozen; got durration = 1; "):
         scenario.law.durration = 1  # type: ignore[union-attr]
-    with pytest.raises(FrozenError, match=r"got del duration; .* try changed\(duration=None\)$"):
+    with pytest.raises(FrozenError, match=r"got del duration; .* try changed\(duration=\.\.\.\)$"):
         del scenario.duration
+    with pytest.raises(FrozenError, match=r"got del noise; .* try changed\(noise=None\)$"):
+        del scenario.noise
+    with pytest.raises(FrozenError, match=r"got durration = 1; .* try changed\(duration=1\)$"):
+        scenario.durration = 1  # type: ignore[attr-defined]
+    with pytest.raises(FrozenError, match=r"got x = 1; .* try changed, with one of its own names$"):
+        scenario.x = 1  # type: ignore[attr-defined]
     assert scenario == read()
+
+
+@pytest.mark.parametrize("given", [None, "duration", [1], 5, b"x", object()])
+def test_a_change_that_is_no_mapping_is_refused(given: Any) -> None:
+    with pytest.raises(ArgumentError, match=r"needs a mapping; try changed\("):
+        read().changed(given)
+    if given is not None:  # as everywhere in pydantic, nothing is to be changed then
+        with pytest.raises(ArgumentError, match=r"needs a mapping; try model_copy\("):
+            read().model_copy(update=given)
+
+
+@pytest.mark.parametrize("given", [5, "x", io.StringIO(), [1], b"x"])
+def test_a_section_that_is_none_is_refused_at_its_place(given: Any) -> None:
+    with pytest.raises(ScenarioError, match=r"law: "):
+        read().changed(law=given)
 
 
 def test_a_mapping_is_a_scenario() -> None:

@@ -9,8 +9,10 @@ from pydantic import ValidationError
 
 from passiflex.campaigns.campaign import Campaign
 from passiflex.errors import ScenarioError
+from passiflex.files import as_path
 from passiflex.simulation.scenario import Scenario
 from passiflex.simulation.scenario_file import load_scenario, read_scenario, read_text
+from passiflex.texts.kinds import of_another_kind
 from passiflex.texts.model_mistakes import explained
 from passiflex.texts.quantity import shown
 from passiflex.texts.yaml_tree import RefusedText, Tree
@@ -26,7 +28,7 @@ def load_campaign(path: str | Path) -> Campaign:
     ScenarioError
         With one line for each mistake, those of the scenario included, or one line if a file cannot be read.
     """
-    path = Path(path)
+    path = as_path(path, "a campaign file")
     return parse_campaign(read_text(path), str(path), path.resolve().parent)
 
 
@@ -43,6 +45,8 @@ def parse_campaign(text: str, source: str = "campaign", base_dir: str | Path | N
         data = tree.read(text, A_CAMPAIGN)
     except RefusedText as error:
         raise ScenarioError(source, [str(error)]) from None
+    if (other := of_another_kind(data, "campaign", source)) is not None:
+        raise ScenarioError(source, [other])
     left_out = data.get("scenario") is None
     if not left_out:
         scenario = _scenario(data.pop("scenario"), tree, base_dir)

@@ -24,6 +24,7 @@ from passiflex.errors import (
     SimulationError,
     ValueRangeError,
 )
+from passiflex.files import as_path
 from passiflex.passivity.ledger import Signals
 from passiflex.pieces.engines import usable_cores
 from passiflex.pieces.manifest import load_manifest
@@ -137,7 +138,7 @@ def replay(folder: str | Path, sample: int) -> Run:
     FolderError, ValueRangeError, OtherRobotError
         If the folder holds no campaign, or it has no such sample, or its robot has changed.
     """
-    manifest = load_manifest(Path(folder))
+    manifest = load_manifest(as_path(folder, "the folder of a campaign"))
     if manifest.source != source_digest():
         warnings.warn(
             f"the rows in {folder} are from version {manifest.version}, commit {manifest.commit}, and not from "

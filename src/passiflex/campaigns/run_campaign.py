@@ -24,7 +24,8 @@ from passiflex.campaigns.possible import require_possible
 from passiflex.campaigns.ranking import worst_first
 from passiflex.campaigns.same_robot import marked, robot_digest
 from passiflex.campaigns.samples import sample_scenario
-from passiflex.errors import NameUnknownError, PassiflexError, ValueRangeError
+from passiflex.errors import ArgumentError, NameUnknownError, PassiflexError, ValueRangeError
+from passiflex.files import as_path
 from passiflex.native import find_compiler
 from passiflex.pieces.cluster import Cluster
 from passiflex.pieces.engines import Engine, InProcess, LocalProcesses
@@ -81,7 +82,7 @@ class Results:
         FolderError
             If it holds none.
         """
-        folder = Path(folder)
+        folder = as_path(folder, "the folder of a campaign")
         campaign = parse_campaign(load_manifest(folder).campaign, source=str(folder))
         own = load_manifest(folder).runs  # folders of before do not say
         there = (folder / RUNS).glob("sample_*.nc")
@@ -115,6 +116,9 @@ def run_campaign(
         Before the start for impossible robots, an unstable loop that is not insisted on, unknown metrics, a
         folder of something else, a scheduler that does not answer; later for a disk that is full.
     """
+    if not isinstance(campaign, Campaign):
+        raise ArgumentError(campaign, "a campaign", "load_campaign for a file")
+    folder = as_path(folder, "the folder of a campaign")
     if samples is not None:
         if not 1 <= samples <= MOST_SAMPLES:
             raise ValueRangeError("number of samples", got=samples, needs=f"1 to {MOST_SAMPLES}")
@@ -131,7 +135,7 @@ def run_campaign(
             folder, text, campaign.samples, extends=prefix, identity=identity, beside=beside
         ) as store:
             run_pieces(store, evaluate_samples, engine, on_progress)
-            results = Results(Path(folder), campaign)
+            results = Results(folder, campaign)
             return Results(results.folder, campaign, _keep_worst(results, store))
 
 

@@ -5,19 +5,21 @@ from __future__ import annotations
 import signal
 import sys
 import traceback
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from passiflex.cli.front import answer
 from passiflex.cli.streams import leave_closed_pipe, printable, replace_what_cannot_be_shown
-from passiflex.errors import PassiflexError
+from passiflex.errors import PassiflexError, PassiflexWarning
 
 if TYPE_CHECKING:
     from types import FrameType
 
     from cyclopts import App
 
+_SHOWN = warnings.showwarning
 FAULT = 70
 """Exit status of a fault of ours, as sysexits.h has it: never that of a verdict."""
 
@@ -51,6 +53,7 @@ def main() -> None:
     of the signal for an interruption, CLOSED_PIPE where nobody reads what is printed.
     """
     replace_what_cannot_be_shown()
+    warnings.showwarning = _say
     try:
         with _ended_quietly():
             status = _run(sys.argv[1:])
@@ -71,6 +74,14 @@ def main() -> None:
         print("passiflex: this is a fault of passiflex, not of yours; please report it", file=sys.stderr)
         sys.exit(FAULT)
     sys.exit(status if isinstance(status, int) else 0)
+
+
+def _say(message: Warning | str, *where: object, **more: object) -> None:
+    """Print a warning: of ours on one line, without the place in the source that a programmer would look for."""
+    if isinstance(message, PassiflexWarning):
+        print(f"passiflex: warning: {printable(str(message))}", file=sys.stderr)
+    else:
+        _SHOWN(message, *where, **more)  # type: ignore[arg-type]
 
 
 def _run(arguments: list[str]) -> object:

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 def campaign(
     campaign: Path,
+    /,
     *,
     out: Annotated[Path, cyclopts.Parameter(help="folder of the results; an interrupted campaign goes on")],
     samples: Annotated[int | None, cyclopts.Parameter(help="instead of the campaign's own number")] = None,
@@ -51,6 +52,7 @@ def campaign(
 
 def replay(
     folder: Path,
+    /,
     *,
     sample: Annotated[int, cyclopts.Parameter(help="number of the sample, from 0")],
     out: Annotated[
@@ -76,6 +78,7 @@ def replay(
 
 def search(
     campaign: Path,
+    /,
     *,
     out: Annotated[Path, cyclopts.Parameter(help="folder for the found scenarios")],
     measure: Annotated[str, cyclopts.Parameter(help="metric to make as bad as it gets")] = "margin",

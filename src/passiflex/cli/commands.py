@@ -53,6 +53,7 @@ def reproduce(
 
 def simulate(
     scenario: Path,
+    /,
     *,
     out: Annotated[Path, cyclopts.Parameter(help="netCDF file to write")],
 ) -> int:
@@ -84,7 +85,7 @@ def simulate(
     return 2 if run.failure else 0
 
 
-def audit(run: Path) -> int:
+def audit(run: Path, /) -> int:
     """Audit a run: exit status 0 passive, 1 violated, 2 inconclusive or not usable."""
     from rich.table import Table
 

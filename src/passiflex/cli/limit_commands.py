@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 def limits(
     scenario: Path,
+    /,
     *,
     rate: Annotated[
         str | None, cyclopts.Parameter(help="control rate, as '1 kHz'; the scenario's own")
@@ -76,6 +77,7 @@ def recommend(
     subject: Annotated[
         str, cyclopts.Parameter(help="robot of the catalogue, robot file, or scenario file, by its path")
     ],
+    /,
     *,
     rate: Annotated[
         str | None, cyclopts.Parameter(help="control rate, as '1 kHz'; of a scenario its own")
@@ -84,7 +86,8 @@ def recommend(
         str | None, cyclopts.Parameter(help="of a command, as '1 ms'; of a scenario its own, else none")
     ] = None,
     margin: Annotated[
-        str, cyclopts.Parameter(help="by how much each number of the robot may be off")
+        str,
+        cyclopts.Parameter(allow_leading_hyphen=True, help="by how much each number of the robot may be off"),
     ] = "20 %",
     task: Annotated[
         Task | None, cyclopts.Parameter(help="what the law holds; of a scenario its own, else pose")
@@ -99,6 +102,7 @@ def recommend(
     """
     from passiflex import limits as room
     from passiflex.limits.subject import number
+    from passiflex.robots.flexible import FlexibleJointRobot
     from passiflex.simulation.scenario_file import is_scenario
     from passiflex.texts.quantity import Quantity
 
@@ -110,8 +114,9 @@ def recommend(
                     subject, share, rate, delay, task=task, inner_loop=inner_loop, report=report
                 )
             else:
+                robot = FlexibleJointRobot.load(subject)  # its mistakes before that there is no rate
                 advice = room.recommend(
-                    subject, _given(rate), delay or 0.0, share, task=task or "pose",
+                    robot, _given(rate), delay or 0.0, share, task=task or "pose",
                     inner_loop=inner_loop, report=report,
                 )  # fmt: skip
         _print_advice(advice)

@@ -24,6 +24,7 @@ DRAWN = (".png", ".pdf", ".svg")
 
 def show(
     run: Path,
+    /,
     *,
     compare: Compared = (),
     out: Annotated[
@@ -52,6 +53,7 @@ def show(
 
 def plot(
     run: Path,
+    /,
     *,
     kind: Annotated[
         Literal["energy", "tracking", "torque", "port"], cyclopts.Parameter(help="what to draw over time")
@@ -79,6 +81,7 @@ def plot(
 
 def export(
     run: Path,
+    /,
     *,
     to: Annotated[
         Literal["rrd", "mcap", "csv"],

@@ -10,7 +10,7 @@ from passiflex.errors import ValueRangeError
 from passiflex.simulation import Problem, Scenario, parse_scenario, resolve
 from passiflex.simulation.altered import HIGHEST_RATE, altered, at_rate
 from passiflex.simulation.scenario_file import as_scenario
-from passiflex.texts.quantity import Quantity
+from passiflex.texts.quantity import Quantity, shown
 
 Subject = Problem | Scenario | Mapping[str, Any] | str | Path
 """A problem, a scenario, a mapping with the entries of a scenario file, or the path of one."""
@@ -88,8 +88,9 @@ def number(name: str, written: float | str, quantity: Quantity) -> float:
     try:
         value = quantity.convert(written)
     except ValueError as mistake:
-        raise ValueRangeError(
-            name, got=repr(written), needs=quantity.words, try_="text with a unit, as '1 kHz' or '1 ms'"
-        ) from mistake
+        try_ = (
+            "a share, as 0.2 or '20 %'" if quantity.unit == "1" else "text with a unit, as '1 kHz' or '1 ms'"
+        )
+        raise ValueRangeError(name, got=shown(written), needs=quantity.words, try_=try_) from mistake
     assert isinstance(value, float)
     return value

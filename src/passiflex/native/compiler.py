@@ -88,13 +88,20 @@ class Compiler:
 def _asked(request: dict[str, Any]) -> dict[str, Any]:
     """Return the answer of a builder."""
     words = [sys.executable, "-I", "-S", builder.__file__]
-    with subprocess.Popen(
-        words,
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        start_new_session=True,  # Ctrl-C in a terminal comes by way of this process
-    ) as process:
+    try:
+        begun = subprocess.Popen(
+            words,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            start_new_session=True,  # Ctrl-C in a terminal comes by way of this process
+        )
+    except OSError as error:
+        got = f"{sys.executable!r}: {error.strerror}"
+        raise CompilerError(
+            "Python cannot be started for the process that runs the compiler", got=got
+        ) from error
+    with begun as process:
         assert process.stdin is not None
         assert process.stdout is not None
         with suppress(BrokenPipeError):  # it has ended already, and has said why

@@ -145,9 +145,10 @@ def _from_cache(compiler: Compiler, source: str, name: str) -> Path | None:
 
 def _ready(compiler: Compiler, source: str, path: Path) -> Path:
     """Return the path of a library, after compiling it there if what is there is not to be loaded."""
+    path, folder_there = _beside_folders(path)
     if _loads(path):
         return path
-    there = is_there(path)
+    there = folder_there or is_there(path)
     compiler.build(source, path)
     if there:
         _warn_once(f"libraries in {path.parent} are damaged or not this user's: they are compiled again")
@@ -159,6 +160,14 @@ def _ready(compiler: Compiler, source: str, path: Path) -> Path:
             try_="setting PASSIFLEX_CACHE to another folder (is this one noexec?)",
         )
     return path
+
+
+def _beside_folders(path: Path) -> tuple[Path, bool]:
+    """Return a library's path, with another name if a folder has its own: that cannot be replaced; and if one has."""
+    was = path
+    while path.is_dir() and not path.is_symlink():
+        path = path.with_name(f"_{path.name}")
+    return path, path != was
 
 
 def _key(source: str, compiler: Compiler) -> str:

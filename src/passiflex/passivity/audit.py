@@ -7,6 +7,7 @@ from typing import Literal
 
 import numpy as np
 
+from passiflex.errors import ArgumentError
 from passiflex.passivity.extremes import Extremes, available_energy, extremes
 from passiflex.passivity.ledger import (
     Balance,
@@ -69,7 +70,15 @@ class Audit:
 
 
 def audit(run: Signals) -> Audit:
-    """Return the audit of a run."""
+    """Return the audit of a run.
+
+    Raises
+    ------
+    ArgumentError
+        If it is no run, as the path of one.
+    """
+    if not hasattr(run, "unbooked"):
+        raise ArgumentError(run, "a run, as simulate returns", "Run.load for a file")
     balances = robot_balance(run), link_balance(run), claimed_balance(run)
     found = extremes(run)
     verdict, time, term, remedy = _judged(run, found, readable=_readable(run, balances[1]))

@@ -7,6 +7,7 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
+from passiflex.errors import ArgumentError
 from passiflex.files import OutputError, whole_file
 from passiflex.reports.header import content
 from passiflex.reports.page import page_text
@@ -32,7 +33,11 @@ def report_text(run: Run, others: Sequence[Run | Viewed] = (), notices: Sequence
     ------
     ViewerError
         If the viewer of reports is not built.
+    ArgumentError
+        If it is no run, as the path of one.
     """
+    if not isinstance(run, Run):
+        raise ArgumentError(run, "a run, as simulate returns", "Run.load for a file")
     viewer = read_viewer()
     header, data = content(run, others, notices)
     return page_text(header["title"], header, data, viewer)
@@ -52,10 +57,7 @@ def write_report(
     if path.suffix not in ENDINGS:
         needs = f"a file name that ends in {' or '.join(ENDINGS)}"
         raise OutputError("wrong name for a report", got=str(path), needs=needs)
-    text = report_text(run, others, notices)
-    with whole_file(path) as temporary:
-        temporary.write_text(text, encoding="utf-8", newline="\n")
-    return path
+    return _written(report_text(run, others, notices), path)
 
 
 def show(
@@ -73,7 +75,14 @@ def show(
     """
     if out is not None:
         return write_report(run, out, others, notices)
+    text = report_text(run, others, notices)
     name = re.sub(r"[^A-Za-z0-9_.-]", "_", run.name)[:100].lstrip(".") or "run"
-    path = write_report(run, Path(tempfile.mkdtemp(prefix="passiflex-")) / f"{name}.html", others, notices)
+    path = _written(text, Path(tempfile.mkdtemp(prefix="passiflex-")) / f"{name}.html")
     open_in_browser(path)
+    return path
+
+
+def _written(text: str, path: Path) -> Path:
+    with whole_file(path) as temporary:
+        temporary.write_text(text, encoding="utf-8", newline="\n")
     return path

@@ -12,12 +12,13 @@ from pydantic import Field, StringConstraints, ValidationError, ValidationInfo, 
 
 from passiflex.errors import RobotError
 from passiflex.robots.chain import SerialChain
+from passiflex.texts.kinds import of_another_kind
 from passiflex.texts.model_mistakes import explained
 from passiflex.texts.quantity import Quantity, shown, unit_factor
 from passiflex.texts.section import Mistakes, Section
 from passiflex.texts.text_file import IN_YAML, UnreadableError, decoded
 from passiflex.texts.unit_spelling import spelt_out
-from passiflex.texts.yaml_tree import Place, RefusedText, Tree, dotted
+from passiflex.texts.yaml_tree import XML, Place, RefusedText, Tree, dotted
 
 Array = NDArray[np.float64]
 Text = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1)]
@@ -62,6 +63,13 @@ class Entry(Section):
     )
     source: Text = Field(description="where the numbers come from, or the word assumed")
 
+    @field_validator("unit", mode="before")
+    @classmethod
+    def _texts(cls, written: Any) -> Any:
+        if not all(isinstance(unit, str) for unit in _leaves(written)):
+            raise ValueError(f"expected text, or one for each joint; got {shown(written)}")
+        return written
+
 
 class Entries(Section):
     """A robot as it stands in its YAML file; `source` is that of the links."""
@@ -83,8 +91,11 @@ class Entries(Section):
     def _with_a_unit(cls, written: Any, info: ValidationInfo) -> Any:
         usual = next(iter(UNITS[info.field_name or ""]["revolute"]))
         if not isinstance(written, dict | Entry):
-            entry = f"{{value: {shown(written)}, unit: {usual}, source: ...}}"
-            raise ValueError(f"needs a unit and a source; got {shown(written)}; try {entry}")
+            named = any(isinstance(v, str) and not _is_number(v) for v in _leaves(written))
+            value = shown(written) if isinstance(written, list) else written
+            entry = f"{{value: {value}, {'' if named else f'unit: {usual}, '}source: ...}}"
+            needs = "a source" if named else "a unit and a source"
+            raise ValueError(f"needs {needs}; got {shown(written)}; try {entry}")
         return written
 
     @field_validator(*UNITS)
@@ -109,9 +120,11 @@ class RobotFile:
         self.path, self._tree = path, Tree()
         try:
             text = decoded(data, IN_YAML)
-            if text.lstrip().startswith("<"):
+            if XML.match(text):
                 raise a_urdf(str(path))
             content = self._tree.read(text, "a robot file has its entries")
+            if (other := of_another_kind(content, "robot file", str(path))) is not None:
+                raise RobotError(f"{path}: {other}")
         except UnreadableError as error:
             raise unreadable(path, error) from None
         except RefusedText as error:

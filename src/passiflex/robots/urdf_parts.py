@@ -123,9 +123,7 @@ class PartReader:
         if fixed:
             return Edge(Joint(name, moves, xyz, rpy, FIRST, **LIMITS), parent, child, fixed)
         dynamics = element.find("dynamics")
-        if dynamics is not None and any(
-            not _zero(v) for k, v in dynamics.items() if k in ("damping", "friction")
-        ):
+        if dynamics is not None and any(not _zero(value) for value in dynamics.attrib.values()):
             self.damped.append(where)
         axis, limits = (
             self._axis(element, where),

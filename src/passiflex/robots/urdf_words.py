@@ -41,6 +41,8 @@ _HARMLESS = {
     "limit": ("name", "id", "acceleration", "deceleration", "jerk", "damping", "friction"),
 }
 """Attributes that say nothing of what is read."""
+SLIP, LONGEST = 0.75, 40
+"""How alike a word and what was meant are, of 1, and letters beyond which no word was."""
 _UNITS = ("unit", "units", "degrees", "angle_unit", "length_unit")
 
 
@@ -62,7 +64,8 @@ def refuse_unread(element: ET.Element, where: str, absent: Sequence[str]) -> Non
             meant += [] if word in _HARMLESS[element.tag] else absent
         if found := [name for name in meant if name in absent]:
             what = f"{where}: {shape} cannot be read"
-            needs = f"{' or '.join(_written(element.tag, name) for name in absent)}, if anything"
+            known = [name for name in absent if name in found or name != "mimic"]
+            needs = f"{' or '.join(_written(element.tag, name) for name in known)}, if anything"
             turned = ", the number that was first as the last" if word == "quat_wxyz" else ""
             raise RobotError(what, needs=needs, try_=_written(element.tag, found[0]) + turned)
 
@@ -77,8 +80,9 @@ def refuse_misspelt(root: ET.Element, source: str) -> None:
 
 
 def _same(word: str, known: Collection[str]) -> list[str]:
-    """Return the known word that a word is but for a slip of the hand."""
-    return difflib.get_close_matches(word, list(known), n=1, cutoff=0.7)
+    """Return the known word that a word is but for a slip of the hand, which hits the first letter least."""
+    alike = [name for name in known if name[:1] == word[:1]]
+    return difflib.get_close_matches(word, alike, n=1, cutoff=SLIP) if len(word) <= LONGEST else []
 
 
 def _unknown(element: ET.Element) -> Iterator[tuple[str, str]]:

@@ -10,7 +10,7 @@ from passiflex.control.gravity import AbstractGravity, MotorGravity, RobotGravit
 from passiflex.control.law import AbstractLaw, ImpedanceLaw
 from passiflex.control.rigid import RigidImpedanceLaw
 from passiflex.control.task import PoseTask, PositionTask
-from passiflex.errors import SizeError, ValueRangeError
+from passiflex.errors import ArgumentError, SizeError, ValueRangeError
 from passiflex.robots.flexible import FlexibleJointRobot
 from passiflex.simulation.gains import law_gains, tank_gains, tank_start
 from passiflex.simulation.law_settings import RigidSettings
@@ -53,6 +53,10 @@ def resolve(scenario: Scenario, robot: FlexibleJointRobot | None = None) -> Prob
     PassiflexError
         If the robot cannot be loaded, a size does not fit it, a start is outside the robot's limits or singular.
     """
+    if not isinstance(scenario, Scenario):
+        raise ArgumentError(
+            scenario, "a scenario", "load_scenario for a file, or simulate, which takes its path"
+        )
     scenario = _checked(scenario)
     if robot is None:
         robot = FlexibleJointRobot.load(scenario.robot)

@@ -16,7 +16,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from passiflex.errors import RunFileError
-from passiflex.files import read_json, whole_file
+from passiflex.files import as_path, read_json, whole_file
 from passiflex.layout import Field, Layout
 from passiflex.simulation.run_attributes import wrong_attributes, wrong_units
 from passiflex.simulation.run_bounds import require_bounded
@@ -134,7 +134,7 @@ class Run:
         RunFileError
             If the file is not there, or is not a run of this package; `salvage` reads what is left of one.
         """
-        path = Path(path)
+        path = as_path(path, "the file of a run")
         require_file(path)
         try:
             require_bounded(path)

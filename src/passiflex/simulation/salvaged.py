@@ -9,6 +9,7 @@ import numpy as np
 import xarray as xr
 
 from passiflex.errors import RunFileError
+from passiflex.files import as_path
 from passiflex.simulation.run import Run
 from passiflex.simulation.run_attributes import without_units, wrong_attributes, wrong_units
 from passiflex.simulation.run_bounds import require_bounded
@@ -50,7 +51,7 @@ def salvage(path: str | Path) -> Salvaged:
     RunFileError
         If the file is not there, is no run of any version, or holds nothing that can be shown.
     """
-    path = Path(path)
+    path = as_path(path, "the file of a run")
     require_file(path)
     _require_bounded(path)
     notices: list[str] = []

@@ -10,6 +10,7 @@ from pydantic import ValidationError
 
 from passiflex.errors import ScenarioError
 from passiflex.simulation.scenario import Scenario
+from passiflex.texts.kinds import of_another_kind
 from passiflex.texts.model_mistakes import explained, told
 from passiflex.texts.quantity import shown
 from passiflex.texts.text_file import IN_YAML, UnreadableError, decoded, is_path, read_bytes
@@ -33,7 +34,17 @@ def load_scenario(path: str | Path) -> Scenario:
             shown(path), ["no scenario; try the path of its file, or parse_scenario for a text"]
         )
     path = Path(path)
+    if len(path.parts) < 2 and not path.suffix and not path.exists():
+        _refuse_robot(str(path))
     return parse_scenario(read_text(path), str(path), path.resolve().parent)
+
+
+def _refuse_robot(name: str) -> None:
+    from passiflex.robots.catalogue import catalogue  # half a second to import: only where a word is no file
+
+    if name in catalogue():
+        try_ = f"passiflex recommend {name} --rate '1 kHz', or {name} as the robot of a scenario"
+        raise ScenarioError(name, [f"this is a robot, not a scenario; try {try_}"])
 
 
 def as_scenario(given: Scenario | Mapping[str, Any] | str | Path) -> Scenario:
@@ -90,6 +101,8 @@ def parse_scenario(text: str, source: str = "scenario", base_dir: str | Path | N
         data = tree.read(text, A_SCENARIO)
     except RefusedText as error:
         raise ScenarioError(source, [str(error)]) from None
+    if (other := of_another_kind(data, "scenario", source)) is not None:
+        raise ScenarioError(source, [other])
     scenario = read_scenario(data, tree, (), base_dir)
     if tree.mistakes or scenario is None:
         raise ScenarioError(source, tree.lines())

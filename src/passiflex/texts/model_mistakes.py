@@ -18,6 +18,9 @@ from passiflex.texts.yaml_tree import Place, dotted
 REFUSED_NAME = "refused_name"
 """Type of a PydanticCustomError that is about the name of an entry, not about its value."""
 
+MOST_HINTS = 100
+"""Unknown names for which the nearest known one is looked for: of more, nobody reads the rest."""
+
 Model = type[BaseModel]
 
 
@@ -30,7 +33,10 @@ def explained(error: ValidationError, data: Any, root: Model) -> Iterator[tuple[
     """
     errors = error.errors(include_url=False)
     unknown = [e["loc"] for e in errors if e["type"] == "extra_forbidden"]
-    misspelt = {(*loc[:-1], *nearest(str(loc[-1]), _names(loc[:-1], root))[:1]) for loc in unknown}
+    misspelt = {
+        (*loc[:-1], *nearest(str(loc[-1]), _names(loc[:-1], root))[:1]) for loc in unknown[:MOST_HINTS]
+    }
+    hinted = set(unknown[:MOST_HINTS])
     for e in errors:
         if e["type"] == "missing" and e["loc"] in misspelt:
             continue  # its name is there, with a mistake that is reported
@@ -47,9 +53,12 @@ def explained(error: ValidationError, data: Any, root: Model) -> Iterator[tuple[
         elif kind == REFUSED_NAME:
             yield place, e["msg"], True
         elif kind == "extra_forbidden":
-            yield place, f"unknown name; {suggested(str(place[-1]), names)}", True
+            hint = f"; {suggested(str(place[-1]), names)}" if e["loc"] in hinted else ""
+            yield place, f"unknown name{hint}", True
         elif kind == "missing":
             yield place, f"missing: {names[str(e['loc'][-1])]}", True
+        elif kind.startswith("union_tag") and not isinstance(e["input"], dict):
+            yield place, f"expected a mapping; got {shown(e['input'])}", False
         elif kind.startswith("union_tag") and e["input"].get(tag := ctx["discriminator"].strip("'")) is None:
             tags = [_tag(m) for m in _reached(e["loc"], root)]
             yield (*place, tag), f"missing: one of {', '.join(map(repr, tags))}", True
@@ -67,6 +76,8 @@ def explained(error: ValidationError, data: Any, root: Model) -> Iterator[tuple[
             yield place, f"expected a whole number, ≥ {least}; got {shown(e['input'])}", False
         elif kind == "string_type":
             yield place, f"expected text; got {shown(e['input'])}; try quotes around it", False
+        elif kind == "string_too_short":
+            yield place, f"expected text; got {shown(e['input'])}", False
         elif kind == "string_pattern_mismatch":
             yield place, f"expected letters, digits, and any of _ . -; got {shown(e['input'])}", False
         else:

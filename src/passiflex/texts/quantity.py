@@ -107,7 +107,7 @@ class Quantity:
             if found is None:
                 raise ValueError("not a number with a unit" if self.unit else "not a number")
             if found[2] and unit is not None:
-                raise ValueError("two units")
+                raise ValueError("two units" if _UNIT.fullmatch(spelt_out(found[2])) else "not a number")
             named = "1" + found[2] if found[2].startswith("/") else found[2]
             return _in_unit(float(found[1].replace(".inf", "inf")), named or unit, self.unit)
         if isinstance(written, list | tuple):

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, ClassVar, NoReturn, Self
 
 from pydantic import BaseModel, ConfigDict, model_validator
 
-from passiflex.errors import FrozenError
+from passiflex.errors import ArgumentError, FrozenError, nearest
+
+NOTHING: Mapping[str, Any] = MappingProxyType({})
 
 
 class Mistakes(ValueError):  # noqa: N818 - one exception for all of them
@@ -33,7 +36,7 @@ class Section(BaseModel):
         known = {f.alias or name for name, f in cls.model_fields.items()}
         return {k: v for k, v in written.items() if v is not None or k not in known}
 
-    def changed(self, entries: Mapping[str, Any] | None = None, /, **more: Any) -> Self:
+    def changed(self, entries: Mapping[str, Any] = NOTHING, /, **more: Any) -> Self:
         """Return a copy with other entries, validated as those of a file.
 
         Parameters
@@ -48,7 +51,9 @@ class Section(BaseModel):
         """
         from passiflex.texts.changes import changed
 
-        return changed(self, {**(entries or {}), **more})
+        if not isinstance(entries, Mapping):
+            raise ArgumentError(entries, "a mapping", 'changed({"duration": 5}) or changed(duration=5)')
+        return changed(self, {**entries, **more})
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
         """Return a copy, with whole entries in place of its own; they are validated as those of a file.
@@ -60,6 +65,8 @@ class Section(BaseModel):
         """
         from passiflex.texts.changes import replaced
 
+        if not isinstance(update, Mapping | None):
+            raise ArgumentError(update, "a mapping", 'model_copy(update={"duration": 5})')
         copy = super().model_copy(deep=deep)
         return replaced(copy, update) if update else copy
 
@@ -67,8 +74,13 @@ class Section(BaseModel):
 
         def __setattr__(self, name: str, value: object) -> NoReturn:
             """Raise FrozenError."""
-            raise FrozenError(type(self).__name__, f"{name} = {value!r}", f"changed({name}={value!r})")
+            known = type(self).model_fields
+            near = [name] if name in known else nearest(name, known)
+            try_ = f"changed({near[0]}={value!r})" if near else "changed, with one of its own names"
+            raise FrozenError(type(self).__name__, f"{name} = {value!r}", try_)
 
         def __delattr__(self, name: str) -> NoReturn:
             """Raise FrozenError."""
-            raise FrozenError(type(self).__name__, f"del {name}", f"changed({name}=None)")
+            field = type(self).model_fields.get(name)
+            try_ = f"changed({name}={'...' if field is not None and field.is_required() else None})"
+            raise FrozenError(type(self).__name__, f"del {name}", try_)

@@ -26,7 +26,8 @@ _WORDS = {
     **dict.fromkeys(("false", "False", "FALSE"), False),
     **dict.fromkeys(("", "~", "null", "Null", "NULL")),
 }
-_XML = re.compile(r"\s*<[?!A-Za-z]")
+XML = re.compile(r"\s*<[?!A-Za-z]")
+"""How a text of XML begins."""
 _SURROGATE = re.compile("[\ud800-\udfff]")
 _STANDARD_TAGS = {f"tag:yaml.org,2002:{kind}" for kind in ("str", "seq", "map")}
 
@@ -83,7 +84,7 @@ class Tree:
         try:
             mapping: dict[str, Any] = self._value(_composed(text, needs), ())
         except RefusedText:
-            if _XML.match(text):
+            if XML.match(text):
                 raise RefusedText(f"XML in place of YAML, as of a URDF; {needs}") from None
             raise
         return mapping

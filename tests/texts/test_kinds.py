@@ -1,0 +1,60 @@
+"""One kind of file in place of another is said as that, not as a list of wrong entries."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from passiflex.campaigns import load_campaign
+from passiflex.errors import PassiflexError, RobotError, ScenarioError
+from passiflex.robots.flexible import FlexibleJointRobot
+from passiflex.simulation import load_scenario
+from passiflex.studies import shipped_scenario
+from passiflex.texts.kinds import KINDS
+from worlds import PLANAR
+
+TEXTS = {
+    "scenario": PLANAR,
+    "campaign": "name: many\nscenario: given.yaml\nsamples: 4\nparameters: {}\n",
+    "robot file": "name: arm\nurdf: arm.urdf\n",
+}
+READERS: dict[str, Callable[[Path], Any]] = {
+    "scenario": load_scenario,
+    "campaign": load_campaign,
+    "robot file": FlexibleJointRobot.load,
+}
+
+
+@pytest.mark.parametrize("wanted", KINDS)
+@pytest.mark.parametrize("given", KINDS)
+def test_another_kind_is_named_with_what_to_do(wanted: str, given: str, tmp_path: Path) -> None:
+    path = tmp_path / "given.yaml"
+    path.write_text(TEXTS[given])
+    if wanted == given:
+        with suppress(RobotError, ScenarioError):  # of files that are not there
+            READERS[wanted](path)
+        return
+    with pytest.raises(PassiflexError) as refused:
+        READERS[wanted](path)
+    use = KINDS[given][1].format(path)
+    assert f"this is a {given}, not a {wanted}; try {use}" in str(refused.value)
+    assert str(refused.value).count("\n") <= 1
+
+
+def test_each_kind_has_its_entry_and_no_other() -> None:
+    scenario = shipped_scenario("fig1").model_dump(by_alias=True)
+    assert [entry in scenario for entry, _ in KINDS.values()] == [True, False, False]
+
+
+def test_a_robot_of_the_catalogue_is_no_scenario(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(
+        PassiflexError, match=r"this is a robot, not a scenario; try passiflex recommend iiwa14 --rate"
+    ):
+        load_scenario("iiwa14")
+    with pytest.raises(PassiflexError, match=r"small: 1 mistake\n  cannot be read: No such file"):
+        load_scenario("small")
