@@ -49,6 +49,6 @@ def test_what_is_no_path(function: Callable[[Any], Any], given: Any, tmp_path: P
 
 
 def test_a_part_of_a_message_is_bearable() -> None:
-    assert len(str(PassiflexError("x" * 10**6, got="y" * 10**6, needs="z" * 10**6))) < 13_000
+    assert len(str(PassiflexError("x" * 10**6, got="y" * 10**6, needs="z" * 10**6))) < 31_000
     message = "\n".join(f"line {i}" for i in range(300))
     assert str(PassiflexError("it failed", got=message)) == f"it failed; got {message}"

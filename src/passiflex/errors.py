@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable
 
-_LONGEST = 4000
+_LONGEST = 10_000
 """Characters of one part of a message: what compilers say fits, a name of a megabyte does not."""
 _LONGEST_NAME = 200
 """Characters of a word for which a near one is looked for; the search is quadratic."""

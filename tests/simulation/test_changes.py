@@ -173,8 +173,8 @@ def test_frozen_is_an_error_of_ours_with_what_to_do() -> None:
         del scenario.noise
     with pytest.raises(FrozenError, match=r"got durration = 1; .* try changed\(duration=1\)$"):
         scenario.durration = 1  # type: ignore[attr-defined]
-    with pytest.raises(FrozenError, match=r"got x = 1; .* try changed, with one of its own names$"):
-        scenario.x = 1  # type: ignore[attr-defined]
+    with pytest.raises(FrozenError, match=r"got foo = 1; .* try changed, with one of its own names$"):
+        scenario.foo = 1  # type: ignore[attr-defined]
     assert scenario == read()
 
 

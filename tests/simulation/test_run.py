@@ -15,7 +15,7 @@ import pytest
 import xarray as xr
 import yaml
 
-from passiflex.errors import RunFileError, SimulationError
+from passiflex.errors import FrozenError, RunFileError, SimulationError
 from passiflex.files import OutputError
 from passiflex.passivity import audit
 from passiflex.robots.arm import SerialArm
@@ -194,6 +194,17 @@ def refused(path: Path) -> str:
     return str(error.value)
 
 
+def test_a_run_is_frozen() -> None:
+    run = Run(xr.Dataset())
+    for change in (
+        lambda: setattr(run, "data", 5),
+        lambda: setattr(run, "foo", 5),
+        lambda: delattr(run, "data"),
+    ):
+        with pytest.raises(FrozenError, match=r"^Run is frozen; .* try Run\(run.data.assign"):
+            change()
+
+
 def test_files_that_are_no_netcdf(tmp_path: Path) -> None:
     run = planar_run().save(tmp_path / "run.nc").read_bytes()
     foreign = {"text.nc": b"time,q\n0,1\n", "empty.nc": b""}
@@ -222,8 +233,8 @@ def test_a_folder(tmp_path: Path) -> None:
 def test_a_scenario_is_not_yet_a_run(tmp_path: Path) -> None:
     path = tmp_path / "planar.yaml"
     path.write_text(PLANAR)
-    expected = f"needs a file that passiflex simulate wrote; try passiflex simulate {path} --out RUN.nc"
-    assert refused(path) == f"{path} is not a netCDF-4 file; {expected}"
+    said = f"this is a scenario, not a run; try passiflex simulate {path} --out RUN.nc"
+    assert refused(path) == f"{path}: {said}"
 
 
 def test_a_run_whose_rows_end_early_has_failed() -> None:

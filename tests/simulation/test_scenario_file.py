@@ -443,7 +443,7 @@ def test_all_mistakes_at_once_in_the_order_of_the_file():
         ("hello", "line 1, column 1: not a mapping; try 'name: ...'"),
         (
             "\n<?xml version='1.0'?>\n<robot/>",
-            "XML in place of YAML, as of a URDF; a scenario needs at least name, robot, posture, law and duration",
+            "XML in place of YAML, as of a URDF, which a robot file names in its entry urdf; a scenario needs at least name, robot, posture, law and duration",
         ),
         ("a: b: c", "line 1, column 5: no YAML: mapping values are not allowed here"),
         (

@@ -84,7 +84,19 @@ def test_a_unit_may_be_spelt_as_on_a_data_sheet(wanted, spellings, si):
 
 
 @pytest.mark.parametrize(
-    ("wanted", "unit"), [("rad/s", "Hz"), ("Hz", "rad/s"), ("Hz", "rpm"), ("rad/s", "kHz")]
+    ("wanted", "unit"),
+    [
+        ("rad/s", "Hz"),
+        ("Hz", "rad/s"),
+        ("Hz", "rpm"),
+        ("rad/s", "kHz"),
+        ("rad/s", "1/min"),
+        ("rad/s", "min⁻¹"),
+        ("rad/s", "min^-1"),
+        ("deg/s", "1/min"),
+        ("rpm", "1/min"),
+        ("N m s/rad", "N m min"),
+    ],
 )
 def test_a_frequency_is_no_speed(wanted, unit):
     """To a parser for which a radian is 1, it is one: 2 pi off."""

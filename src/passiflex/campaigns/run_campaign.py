@@ -130,7 +130,7 @@ def run_campaign(
         robot = _ready(campaign)
         prefix = campaign.sampling != "latin_hypercube"
         text, identity = marked(campaign.to_yaml(), robot), marked(_identity(campaign), robot)
-        beside = (STATISTICS, *PAGE)
+        beside = (STATISTICS, *PAGE, f"{RUNS}/sample_*.nc")
         with open_store(
             folder, text, campaign.samples, extends=prefix, identity=identity, beside=beside
         ) as store:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -65,7 +66,7 @@ def replay(
 
     with timed():
         out = folder / f"sample_{sample}.nc" if out is None else out
-        if out.suffix != ".nc" or out.is_dir():
+        if out.suffix != ".nc" or os.path.isdir(out):
             raise OutputError("--out is no netCDF file", got=str(out), needs="a file name that ends in .nc")
         with progress_lines() as report:
             report(f"{folder}: sample {sample}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -170,7 +171,7 @@ def _print_control(run: Run) -> None:
 def _refuse_target(scenario: Path, out: Path) -> None:
     from passiflex.files import OutputError
 
-    if out.suffix != ".nc" or out.is_dir() or out.resolve() == scenario.resolve():
+    if out.suffix != ".nc" or os.path.isdir(out) or out.resolve() == scenario.resolve():
         raise OutputError("--out is no netCDF file", got=str(out), needs="a file name that ends in .nc")
 
 

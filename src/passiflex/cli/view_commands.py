@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -120,7 +121,7 @@ def _target(out: Path | None, usual: str, endings: tuple[str, ...], run: Path, *
     require_file(run)
     if out is None:
         out = run.with_name(run.stem + usual)
-    if out.is_dir():
+    if os.path.isdir(out):
         raise OutputError("the file to write is a folder", got=str(out))
     if out.suffix not in endings:
         raise OutputError(

@@ -58,7 +58,7 @@ def open_store(
     extends: Whether the first samples of a campaign of more are the samples of this one.
     identity: What must be the same to go on, if that is not the text itself: the resolved configuration
         without the number of samples.
-    beside: Names of the files that will be made of the rows, in the same folder.
+    beside: Names of the files that will be made of the rows, from the folder; patterns as of `Path.glob`.
 
     Raises
     ------
@@ -242,8 +242,9 @@ def _require_no_others(folder: Path, beside: Collection[str]) -> None:
             f"{folder} holds rows of an unknown campaign", got=f"no {NAME}", try_="another folder"
         )
     for name in beside:
-        if os.path.lexists(folder / name):
-            what = f"{folder / name} is none that this campaign wrote"
+        there = folder.glob(name) if "*" in name else filter(os.path.lexists, [folder / name])
+        for path in there:
+            what = f"{path} is none that this campaign wrote"
             raise FolderError(what, try_="another folder, or move it away")
 
 

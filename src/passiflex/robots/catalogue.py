@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -18,6 +19,7 @@ from passiflex.robots.chain import SerialChain, read_chain
 from passiflex.robots.doubts import doubts
 from passiflex.robots.robot_file import UNITS, RobotFile, a_urdf, unreadable
 from passiflex.robots.urdf_xml import MOST_BYTES
+from passiflex.texts.kinds import another_file
 from passiflex.texts.quantity import shown
 from passiflex.texts.text_file import URDFS, UnreadableError, is_path, read_bytes
 
@@ -89,6 +91,8 @@ def read_description(name_or_path: str | Path) -> RobotDescription:
         raise a_urdf(str(name_or_path))
     if is_path(name_or_path):
         return _read(Path(name_or_path))
+    if (other := another_file(Path(name_or_path), "robot file")) is not None:
+        raise RobotError(f"{name_or_path}: {other}")
     if name_or_path not in catalogue():
         raise NameUnknownError("robot", str(name_or_path), catalogue())
     with resources.as_file(resources.files(__package__) / "data" / f"{name_or_path}.yaml") as shipped:
@@ -107,7 +111,7 @@ def _read(path: Path, *, quiet: bool = False) -> RobotDescription:
     written = RobotFile(path, content)
     entries = written.entries
     urdf = path.parent / entries.urdf
-    if "\0" in entries.urdf or not urdf.exists():
+    if "\0" in entries.urdf or not os.path.exists(urdf):
         needs = "a path, absolute or from the folder of this file"
         raise written.mistake(("urdf",), ": no such file", got=repr(str(urdf)), needs=needs)
     links = _held(urdf)

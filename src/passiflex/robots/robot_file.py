@@ -12,7 +12,7 @@ from pydantic import Field, StringConstraints, ValidationError, ValidationInfo, 
 
 from passiflex.errors import RobotError
 from passiflex.robots.chain import SerialChain
-from passiflex.texts.kinds import of_another_kind
+from passiflex.texts.kinds import another_file, of_another_kind
 from passiflex.texts.model_mistakes import explained
 from passiflex.texts.quantity import Quantity, shown, unit_factor
 from passiflex.texts.section import Mistakes, Section
@@ -66,7 +66,7 @@ class Entry(Section):
     @field_validator("unit", mode="before")
     @classmethod
     def _texts(cls, written: Any) -> Any:
-        if not all(isinstance(unit, str) for unit in _leaves(written)):
+        if not all(isinstance(unit, str) and unit.strip() for unit in _leaves(written)):
             raise ValueError(f"expected text, or one for each joint; got {shown(written)}")
         return written
 
@@ -209,6 +209,8 @@ class RobotFile:
 
 def unreadable(path: Path, error: Exception) -> RobotError:
     """Return what to say of a robot file that cannot be read."""
+    if (other := another_file(path, "robot file")) is not None:
+        return RobotError(f"{path}: {other}")
     return RobotError(f"robot file {str(path)!r} cannot be read", got=error, needs="a YAML file")
 
 

@@ -22,6 +22,8 @@ LARGEST = 1e9
 """A length, angle, mass or moment of inertia beyond this is no robot's, in whichever unit."""
 FULL_TURN = 6.3
 """An angle [rad] beyond this is likely meant in degrees."""
+MOST_TURNS = 8 * np.pi
+"""A limit [rad] beyond this likewise: few cables bear more turns, and who has none writes continuous."""
 MOST_NAMES = 20
 LONGEST = 1000  # characters of one attribute with numbers
 
@@ -87,11 +89,14 @@ class PartReader:
     def __init__(self, version: str):
         self.version = version
         self.degrees: list[str] = []
+        self.turned_far: list[str] = []
         self.damped: list[str] = []
         self.doubled: list[str] = []
 
     def remarks(self) -> Iterator[str]:
         """Yield a sentence on each thing that a document can hardly mean, or that is not read of it."""
+        if self.turned_far:
+            yield f"{listed(self.turned_far)}: <limit> looks like degrees, and is read as rad"
         if self.degrees:
             yield f"{listed(self.degrees)}: rpy looks like degrees, and is read as rad"
         if self.damped:
@@ -129,6 +134,9 @@ class PartReader:
             self._axis(element, where),
             self._limits(element, where, continuous=kind == "continuous"),
         )
+        farthest = max(abs(limits["lower"]), abs(limits["upper"]))
+        if kind == "revolute" and MOST_TURNS < farthest < np.inf:
+            self.turned_far.append(where)
         return Edge(Joint(name, moves, xyz, rpy, axis, **limits), parent, child, fixed)
 
     def inertial(self, element: ET.Element, name: str) -> Body | None:

@@ -53,9 +53,10 @@ def refuse_unread(element: ET.Element, where: str, absent: Sequence[str]) -> Non
     ----------
     absent: Attributes and elements that are not there and for which a default would be taken.
     """
-    for shape, name in _unknown(element):
+    for shape, name, attributes in _unknown(element):
         word = name.lower().replace("-", "_")
         meant = [*filter(None, [_ELSEWHERE.get(element.tag, {}).get(word)]), *_same(word, absent)]
+        meant += [tag for tag in absent if tag in LEAVES and not attributes.isdisjoint(ATTRIBUTES[tag])]
         if element.tag in _HARMLESS:  # where every attribute is a number that is read
             if word in _UNITS:
                 raise RobotError(
@@ -85,16 +86,16 @@ def _same(word: str, known: Collection[str]) -> list[str]:
     return difflib.get_close_matches(word, alike, n=1, cutoff=SLIP) if len(word) <= LONGEST else []
 
 
-def _unknown(element: ET.Element) -> Iterator[tuple[str, str]]:
-    """Yield how it is written, and its name, for everything in an element that is not read; extensions are left out."""
+def _unknown(element: ET.Element) -> Iterator[tuple[str, str, set[str]]]:
+    """Yield how it is written, its name and attributes, of all in an element that is not read but for extensions."""
     for name in element.attrib:
         if name not in ATTRIBUTES.get(element.tag, ()) and ":" not in name and name != "xmlns":
-            yield f"<{element.tag} {name}=...>", name
+            yield f"<{element.tag} {name}=...>", name, set()
     for child in element:
         if child.tag not in READ.get(element.tag, ()) and ":" not in child.tag:
-            yield f"<{child.tag}> in <{element.tag}>", child.tag
+            yield f"<{child.tag}> in <{element.tag}>", child.tag, set(child.attrib)
     if element.tag in LEAVES and element.text:
-        yield f"the text {shown(element.text)} in <{element.tag}>", element.text
+        yield f"the text {shown(element.text)} in <{element.tag}>", element.text, set()
 
 
 def _written(tag: str, name: str) -> str:

@@ -20,7 +20,7 @@ READ = {
     "inertial": ("origin", "mass", "inertia"),
     "joint": ("origin", "parent", "child", "axis", "limit", "dynamics", "mimic"),
 }
-"""Element → what of its content is read. Of other content the name is kept, of what lies in that nothing."""
+"""Element → what of its content is read. Of other content its name and those of its attributes are kept, no more."""
 LEAVES = ("origin", "axis", "limit", "mass", "inertia", "parent", "child")
 """Elements whose attributes are read; of text in them it is kept that there is some."""
 ATTRIBUTES = {
@@ -133,7 +133,7 @@ class _Reader:
             self.open.append(ET.SubElement(self.open[-1], tag, attributes))
         else:
             self._refuse_template(tag, {})
-            ET.SubElement(self.open[-1], tag)
+            ET.SubElement(self.open[-1], tag, dict.fromkeys(attributes, ""))
             self.outside = 1
 
     def end(self, tag: str) -> None:

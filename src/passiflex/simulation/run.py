@@ -9,13 +9,13 @@ from dataclasses import dataclass, replace
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from passiflex.errors import RunFileError
+from passiflex.errors import FrozenError, RunFileError
 from passiflex.files import as_path, read_json, whole_file
 from passiflex.layout import Field, Layout
 from passiflex.simulation.run_attributes import wrong_attributes, wrong_units
@@ -157,6 +157,15 @@ class Run:
         if broken:
             raise RunFileError(f"{path} has numbers that are not finite", got=f"in {', '.join(broken)}")
         return cls(data)
+
+
+def _refuse_change(run: Run, name: str, *value: object) -> NoReturn:
+    """Raise FrozenError."""
+    got = f"{name} = ..." if value else f"del {name}"
+    raise FrozenError("Run", got, "Run(run.data.assign(...))")
+
+
+Run.__setattr__ = Run.__delattr__ = _refuse_change  # type: ignore[assignment,method-assign]
 
 
 class Rows(NamedTuple):

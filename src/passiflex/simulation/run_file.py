@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Collection
 from pathlib import Path
 from typing import NamedTuple
@@ -10,6 +11,7 @@ import numpy as np
 import xarray as xr
 
 from passiflex.errors import RunFileError
+from passiflex.texts.kinds import NETCDF, another_file
 
 FORMAT = "passiflex run 1"
 PHYSICAL = (
@@ -50,7 +52,6 @@ LOOKED_AT = (
     "tau_e", "wrench", "torque_limit",
 )  # fmt: skip
 """What people look at besides, and every run has."""
-SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
 
 class Defects(NamedTuple):
@@ -100,24 +101,22 @@ def remarks(data: xr.Dataset, explained: Collection[str] = ()) -> list[str]:
 
 def require_file(path: Path) -> None:
     """Raise RunFileError unless there is a file."""
-    if path.is_dir():
+    if os.path.isdir(path):
         raise RunFileError(f"{path} is a folder", needs="the file of a run")
-    if path.exists() and not path.is_file():
+    if os.path.exists(path) and not os.path.isfile(path):
         raise RunFileError(f"{path} is no regular file", needs="the file of a run")
-    if not path.is_file():
+    if not os.path.isfile(path):
         raise RunFileError(f"no such file: {path}", try_="passiflex simulate SCENARIO.yaml --out RUN.nc")
 
 
 def unreadable(path: Path, error: Exception) -> RunFileError:
     """Return what to say of a file that no reader can open: whether it is a netCDF file at all, or the rest is lost."""
     with path.open("rb") as file:
-        begin = file.read(len(SIGNATURE))
-    if begin != SIGNATURE:
-        scenario = path.suffix in (".yaml", ".yml")
-        try_ = f"passiflex simulate {path} --out RUN.nc" if scenario else None
-        return RunFileError(
-            f"{path} is not a netCDF-4 file", needs="a file that passiflex simulate wrote", try_=try_
-        )
+        begin = file.read(len(NETCDF))
+    if begin != NETCDF:
+        if (other := another_file(path, "run")) is not None:
+            return RunFileError(f"{path}: {other}")
+        return RunFileError(f"{path} is not a netCDF-4 file", needs="a file that passiflex simulate wrote")
     return RunFileError(
         f"{path} is a netCDF file that is cut short or damaged",
         got=f"{path.stat().st_size} bytes, {type(error).__name__}",

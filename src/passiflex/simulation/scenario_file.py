@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -10,7 +11,7 @@ from pydantic import ValidationError
 
 from passiflex.errors import ScenarioError
 from passiflex.simulation.scenario import Scenario
-from passiflex.texts.kinds import of_another_kind
+from passiflex.texts.kinds import another_file, of_another_kind
 from passiflex.texts.model_mistakes import explained, told
 from passiflex.texts.quantity import shown
 from passiflex.texts.text_file import IN_YAML, UnreadableError, decoded, is_path, read_bytes
@@ -34,7 +35,7 @@ def load_scenario(path: str | Path) -> Scenario:
             shown(path), ["no scenario; try the path of its file, or parse_scenario for a text"]
         )
     path = Path(path)
-    if len(path.parts) < 2 and not path.suffix and not path.exists():
+    if len(path.parts) < 2 and not path.suffix and not os.path.exists(path):
         _refuse_robot(str(path))
     return parse_scenario(read_text(path), str(path), path.resolve().parent)
 
@@ -85,7 +86,8 @@ def read_text(path: Path) -> str:
     try:
         return decoded(read_bytes(path), IN_YAML)
     except UnreadableError as error:
-        raise ScenarioError(str(path), [f"cannot be read: {error}"]) from None
+        other = another_file(path, "scenario")
+        raise ScenarioError(str(path), [other or f"cannot be read: {error}"]) from None
 
 
 def parse_scenario(text: str, source: str = "scenario", base_dir: str | Path | None = None) -> Scenario:

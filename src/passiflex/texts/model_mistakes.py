@@ -158,7 +158,7 @@ def _in_file(loc: Place, data: Any, root: Model) -> Place:
         if not in_file or inserted:
             continue
         out.append(part)
-        inside = part in data if isinstance(data, dict) else isinstance(data, list)
+        inside = part in data if isinstance(data, dict) else isinstance(data, list) and isinstance(part, int)
         data = data[part] if inside else None
     return tuple(out)
 

@@ -19,7 +19,10 @@ _LONGEST = 80  # characters of one quantity; longer text is no quantity, and is 
 _NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?|[+-]?\.?inf(?![A-Za-z])"
 _TEXT = re.compile(rf"({_NUMBER})\s*(.*)")
 # Names, products, quotients and small powers only: the unit parser evaluates whatever it is given.
-_OFTEN, _TURNING = re.compile("Hz|hertz"), re.compile("rad|deg|°|turn|rp[ms]|revolution|rotation|cycle|arc")
+_OFTEN, _TURNING = (
+    re.compile("Hz|hertz|min|hour"),
+    re.compile("rad|deg|°|turn|rp[ms]|revolution|rotation|cycle|arc"),
+)
 _UNIT = re.compile(r"(?:1\s*/)?(?:[A-Za-zµ°%/() ]|\^-?[1-9](?![0-9^.]))*")
 
 USUAL = {
@@ -160,7 +163,7 @@ def unit_factor(unit: str, wanted: str) -> float:
         raise ValueError(f"unknown unit {shown(unit)}")
     if (spelt, aim) in USUAL:
         return USUAL[spelt, aim]
-    if any(_OFTEN.search(a) and _TURNING.search(b) for a, b in ((spelt, aim), (aim, spelt))):
+    if any(_often(a) and _TURNING.search(b) for a, b in ((spelt, aim), (aim, spelt))):
         raise ValueError(f"{unit}: of a frequency and a speed, one counts turns and the other radians")
     units = _registry()
     try:
@@ -175,6 +178,11 @@ def unit_factor(unit: str, wanted: str) -> float:
     if none != 0 or not 0 < factor < math.inf:
         raise ValueError(f"not a proportional unit: {shown(unit)}")
     return factor
+
+
+def _often(unit: str) -> bool:
+    """Return whether a unit says how often something is: in Hz, or by the minute, as data sheets have turns."""
+    return _OFTEN.search(unit) is not None and _TURNING.search(unit) is None
 
 
 def _in_unit(number: float, unit: str | None, wanted: str) -> float:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Mapping
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, ClassVar, NoReturn, Self
 
 from pydantic import BaseModel, ConfigDict, model_validator
 
-from passiflex.errors import ArgumentError, FrozenError, nearest
+from passiflex.errors import ArgumentError, FrozenError
 
 NOTHING: Mapping[str, Any] = MappingProxyType({})
 
@@ -75,7 +76,7 @@ class Section(BaseModel):
         def __setattr__(self, name: str, value: object) -> NoReturn:
             """Raise FrozenError."""
             known = type(self).model_fields
-            near = [name] if name in known else nearest(name, known)
+            near = difflib.get_close_matches(name, known, n=1, cutoff=0.7)
             try_ = f"changed({near[0]}={value!r})" if near else "changed, with one of its own names"
             raise FrozenError(type(self).__name__, f"{name} = {value!r}", try_)
 

@@ -85,7 +85,8 @@ class Tree:
             mapping: dict[str, Any] = self._value(_composed(text, needs), ())
         except RefusedText:
             if XML.match(text):
-                raise RefusedText(f"XML in place of YAML, as of a URDF; {needs}") from None
+                what = "XML in place of YAML, as of a URDF, which a robot file names in its entry urdf"
+                raise RefusedText(f"{what}; {needs}") from None
             raise
         return mapping
 
