@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from passiflex.robots.chain import rotation_of
+from passiflex.robots.bodies import from_origin, rotation_of
 from passiflex.simulation import Problem
 
 Array = NDArray[np.float64]
@@ -56,10 +56,11 @@ def mjcf(problem: Problem, integrator: str, step: float) -> str:
             f' armature="{b / 2!r}"/><inertial pos="0 0 0" mass="1" diaginertia="{numbers(np.full(3, b / 2))}"/></body>'
         )
     for i, joint in enumerate(chain.joints):
-        xx, xy, xz, yy, yz, zz = of["link_inertia"][i]
+        body = from_origin(of["link_mass"][i], of["link_moment"][i], of["link_inertia"][i])
+        xx, xy, xz, yy, yz, zz = body.inertia
         out.append(
             f'<body pos="{numbers(joint.xyz)}" quat="{quaternion(rotation_of(joint.rpy))}">'
-            f'<inertial pos="{numbers(of["link_com"][i])}" mass="{float(of["link_mass"][i])!r}"'
+            f'<inertial pos="{numbers(body.com)}" mass="{float(body.mass)!r}"'
             f' fullinertia="{numbers(np.array([xx, yy, zz, xy, xz, yz]))}"/>'
             f'<joint name="joint_{i + 1}" type="hinge" axis="{numbers(joint.axis)}"/>'
         )

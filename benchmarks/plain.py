@@ -15,6 +15,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
+from passiflex.robots.bodies import from_origin, matrix
 from passiflex.simulation import Problem
 
 Array = NDArray[np.float64]
@@ -30,10 +31,9 @@ class Robot:
 
     def __init__(self, urdf: str, numbers: dict[str, Array]):
         model = pin.buildModelFromXML(urdf)
-        for i, (mass, com) in enumerate(zip(numbers["link_mass"], numbers["link_com"], strict=True)):
-            ixx, ixy, ixz, iyy, iyz, izz = numbers["link_inertia"][i]
-            inertia = np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
-            model.inertias[i + 1] = pin.Inertia(float(mass), com, inertia)
+        for i, mass in enumerate(numbers["link_mass"]):
+            body = from_origin(float(mass), numbers["link_moment"][i], numbers["link_inertia"][i])
+            model.inertias[i + 1] = pin.Inertia(body.mass, body.com, matrix(body.inertia))
         model.gravity.linear = numbers["gravity"]
         self.tip = model.getFrameId("tip")
         model.frames[self.tip].placement = pin.SE3(numbers["tool_rotation"], numbers["tool_position"])

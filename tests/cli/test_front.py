@@ -21,7 +21,7 @@ from passiflex.cli.command_table import EXAMPLES, GROUPS
 from worlds import PLANAR
 
 COMMANDS = list(chain.from_iterable(GROUPS.values()))
-LARGE = {"adam", "casadi", "h5py", "matplotlib", "pandas", "pint", "pyarrow", "scipy", "xarray"}
+LARGE = {"casadi", "h5py", "matplotlib", "pandas", "pint", "pyarrow", "scipy", "xarray"}
 ROOT = Path(__file__).parents[2]
 
 

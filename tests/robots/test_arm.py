@@ -49,7 +49,7 @@ def evaluate(arm: SerialArm, q: np.ndarray, dq: np.ndarray) -> dict[str, np.ndar
 
 def close(ours: np.ndarray, theirs: np.ndarray) -> None:
     scale = max(1.0, float(np.abs(theirs).max(initial=0)))
-    np.testing.assert_allclose(np.ravel(ours), np.ravel(theirs), rtol=0, atol=1e-10 * scale)
+    np.testing.assert_allclose(np.ravel(ours), np.ravel(theirs), rtol=0, atol=1e-12 * scale)
 
 
 def check_against_pinocchio(chain: SerialChain, seed: int) -> None:
@@ -77,8 +77,8 @@ def check_against_pinocchio(chain: SerialChain, seed: int) -> None:
     close(ours["dM"], ours["C"] + np.transpose(ours["C"]))
 
 
-@settings(max_examples=25, deadline=None)
-@given(serial_chains(1, 8), st.integers(0, 2**32 - 1))
+@settings(max_examples=60, deadline=None)
+@given(serial_chains(1, 12), st.integers(0, 2**32 - 1))
 def test_random_arms_agree_with_pinocchio(chain: SerialChain, seed: int) -> None:
     check_against_pinocchio(chain, seed)
 
@@ -125,7 +125,7 @@ def test_tool_and_inertia_are_inputs() -> None:
     numbers, f = arm.nominal(), expressions(arm)
     q, dq = np.full(7, 0.4), np.zeros(7)
     base = f.call({"q": q, "dq": dq, "m": arm.layout.pack(numbers)})
-    doubled = numbers | {"link_mass": 2 * numbers["link_mass"], "link_inertia": 2 * numbers["link_inertia"]}
+    doubled = numbers | {k: 2 * numbers[k] for k in ("link_mass", "link_moment", "link_inertia")}
     heavy = f.call({"q": q, "dq": dq, "m": arm.layout.pack(doubled)})
     close(np.array(heavy["M"]), 2 * np.array(base["M"]))
     longer = numbers | {"tool_position": numbers["tool_position"] + [0, 0, 0.2]}

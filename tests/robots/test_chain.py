@@ -4,11 +4,9 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
-import casadi as cs
 import numpy as np
 import pinocchio as pin
 import pytest
-from adam.casadi import KinDynComputations
 from hypothesis import given, settings
 from scipy.spatial.transform import Rotation
 
@@ -84,20 +82,6 @@ def test_canonical_urdf_reads_back(chain):
     np.testing.assert_array_equal(again.tip_xyz, chain.tip_xyz)
     np.testing.assert_allclose(again.tip_rotation, chain.tip_rotation, rtol=0, atol=1e-15)
     assert chain.triangle_defects() == []
-
-
-@settings(deadline=None, max_examples=5)
-@given(serial_chains(2, 4, prismatic=False))
-def test_adam_and_pinocchio_read_the_canonical_urdf_alike(chain):
-    """Revolute joints only: the prismatic joint of adam 0.5 neither turns its axis nor has six components."""
-    urdf = chain.to_urdf()
-    q = np.random.default_rng(2).uniform(-1, 1, chain.n)
-    model = KinDynComputations(urdf, [f"joint_{i + 1}" for i in range(chain.n)])
-    mass = np.asarray(cs.DM(model.mass_matrix(np.eye(4), q)))[6:, 6:]
-    placement = np.asarray(cs.DM(model.forward_kinematics("tip", np.eye(4), q)))
-    theirs = dynamics(urdf, "tip", q)
-    np.testing.assert_allclose(mass, theirs[0], rtol=0, atol=1e-10 * np.abs(theirs[0]).max())
-    np.testing.assert_allclose(placement, theirs[2], rtol=0, atol=1e-10)
 
 
 @pytest.mark.parametrize("pitch", [np.pi / 2, -np.pi / 2, np.pi / 2 - 1e-8])

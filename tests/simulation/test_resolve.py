@@ -248,7 +248,7 @@ ERRORS = {
     "joint_stiffness": ["joint_stiffness"],
     "joint_damping": ["joint_damping"],
     "motor_inertia": ["motor_inertia"],
-    "link_inertia": ["link_mass", "link_inertia"],
+    "link_inertia": ["link_mass", "link_moment", "link_inertia"],
 }
 
 

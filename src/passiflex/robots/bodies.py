@@ -82,6 +82,19 @@ def lumped(parts: list[Body]) -> Body:
     return Body(mass, com, components(tensor))
 
 
+def about_origin(body: Body) -> Array:
+    """Return Ixx, Ixy, Ixz, Iyy, Iyz, Izz about the origin of the link's frame, link axes."""
+    d = body.com
+    return components(matrix(body.inertia) + body.mass * (d @ d * np.eye(3) - np.outer(d, d)))
+
+
+def from_origin(mass: float, moment: Array, inertia: Array) -> Body:
+    """Return a body by its mass, mass times centre of mass, and inertia about the origin as `about_origin` has it."""
+    com = moment / mass
+    shift = moment @ com * np.eye(3) - np.outer(moment, com)
+    return Body(mass, com, components(matrix(inertia) - shift))
+
+
 def triangle_defect(body: Body, tolerance: float = ROUND_OFF) -> str | None:
     """Return in which way no distribution of mass has the principal moments of a body, None where one can."""
     a, b, c = np.linalg.eigvalsh(matrix(body.inertia))

@@ -36,7 +36,7 @@ SCALED = {
     "joint_stiffness": ("joint_stiffness",),
     "joint_damping": ("joint_damping",),
     "motor_inertia": ("motor_inertia",),
-    "link_inertia": ("link_mass", "link_inertia"),
+    "link_inertia": ("link_mass", "link_moment", "link_inertia"),
 }
 """Entry of `deviations` and `model_errors` → the numbers of `FlexibleJointRobot.layout` that it scales."""
 SLOWEST_CONTRACTION = 0.1
