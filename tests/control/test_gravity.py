@@ -115,11 +115,12 @@ def test_motor_gravity_is_the_weight_at_the_motors() -> None:
 
 
 def _heights(robot: FlexibleJointRobot, q: np.ndarray) -> np.ndarray:
-    """Heights of the centres of mass: ∂V/∂mᵢ / g."""
+    """Heights of the centres of mass: ∂V/∂mᵢ / g, where the moment m c of a link grows with its mass."""
     _, m = robot.layout.symbols("m")
-    vector = cs.vertcat(*cs.symvar(m.link_mass))
+    com = np.array([body.com for body in robot.arm.chain.bodies])
     V = robot.arm.potential_energy(cs.SX(q), m)
-    f = cs.Function("h", [robot.layout.stack(vars(m))], [cs.gradient(V, vector) / 9.81])
+    slope = cs.gradient(V, m.link_mass) + cs.sum2(cs.gradient(V, m.link_moment) * com)
+    f = cs.Function("h", [robot.layout.stack(vars(m))], [slope / 9.81])
     return np.array(f(robot.layout.pack(robot.nominal()))).ravel()
 
 

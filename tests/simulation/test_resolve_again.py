@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from passiflex.errors import ScenarioError
-from passiflex.robots import SerialArm
+from passiflex.robots.recursions import Recursions
 from passiflex.simulation import Scenario, parse_scenario, resolve
 from passiflex.simulation import resolve as exported
 from passiflex.studies import shipped_scenario
@@ -25,7 +25,7 @@ def test_another_sample_builds_no_robot_and_parses_no_text(
     def never(*_: object) -> Any:
         raise AssertionError("made again")
 
-    monkeypatch.setattr(SerialArm, "_algorithms", never)
+    monkeypatch.setattr(Recursions, "moved", never)
     monkeypatch.setitem(exported.__globals__, "parse_scenario", never)
     other = scenario.model_copy(update={"deviations": {"link_inertia": 0.1}, "seed": 7})
     again = resolve(other)

@@ -17,7 +17,7 @@ from passiflex.control.signals import Command, LawEnergy, Measurement, Reference
 from passiflex.control.task import AbstractTask, PoseTask
 from passiflex.layout import Field, Layout
 from passiflex.robots.flexible import FlexibleJointRobot
-from passiflex.robots.linear_algebra import solve_spd
+from passiflex.robots.linear_algebra import gram, solve_spd
 
 
 class OuterLoop(NamedTuple):
@@ -128,7 +128,7 @@ class ImpedanceLaw(AbstractLaw):
         S, held = self.task.basis(reference.pose), list(self.task.held)
         J_q = S.T @ arm.jacobian(q, m)[rows, :]
         null = null_space_damping(arm.mass_matrix(q, m), J_q, g.null_space_damping, g.regularisation)
-        cartesian = J.T @ S @ g.damping[held, held] @ S.T @ J
+        cartesian = gram(S.T @ J, g.damping[held, held])
         return OuterLoop(weight.torque - J.T @ spring.gradient[rows], cartesian + null, cartesian)
 
     def command(

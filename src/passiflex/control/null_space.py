@@ -5,7 +5,7 @@ from __future__ import annotations
 import casadi as cs
 
 from passiflex.control.signals import Contribution
-from passiflex.robots.linear_algebra import half_solve_spd, solve_spd
+from passiflex.robots.linear_algebra import gram, half_solve_spd, solve_spd
 
 
 def inverse_cartesian_inertia(
@@ -16,7 +16,7 @@ def inverse_cartesian_inertia(
     Near a singular posture ε > 0 bounds Λ; it makes Λ smaller, so that D_ns of (35) stays ≥ 0.
     """
     half = half_solve_spd(mass_matrix, jacobian.T)
-    return half.T @ half + regularisation * cs.SX.eye(jacobian.shape[0])
+    return gram(half) + regularisation * cs.SX.eye(jacobian.shape[0])
 
 
 def null_space_damping(
@@ -25,7 +25,7 @@ def null_space_damping(
     """Return D_ns = k_ns (M − Jᵀ Λ J) of (35) [N m s/rad], symmetric and ≥ 0; (33) is not needed."""
     mobility = inverse_cartesian_inertia(mass_matrix, jacobian, regularisation)
     half = half_solve_spd(mobility, jacobian)  # halfᵀ half = Jᵀ Λ J, symmetric to the last bit
-    return gain * (mass_matrix - half.T @ half)
+    return gain * (mass_matrix - gram(half))
 
 
 def null_space_contribution(

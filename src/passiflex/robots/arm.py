@@ -13,7 +13,8 @@ import numpy as np
 from passiflex.layout import Field, Layout
 from passiflex.robots.bodies import about_origin
 from passiflex.robots.chain import SerialChain
-from passiflex.robots.recursions import Inertia, Placed, Recursions
+from passiflex.robots.joint_frames import Inertia
+from passiflex.robots.recursions import Placed, Recursions
 
 
 class EndEffectorPose(NamedTuple):

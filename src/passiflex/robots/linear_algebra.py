@@ -11,6 +11,17 @@ from typing import NamedTuple
 import casadi as cs
 
 
+def gram(columns: cs.SX, weights: cs.SX | None = None) -> cs.SX:
+    """Return Hᵀ W H with a symmetric W, or the unit matrix: each entry and its mirror image once, the same."""
+    weighted = columns if weights is None else weights @ columns
+    n = columns.shape[1]
+    out = cs.SX(n, n)
+    for i in range(n):
+        for j in range(i + 1):
+            out[i, j] = out[j, i] = cs.dot(columns[:, i], weighted[:, j])
+    return cs.densify(out)
+
+
 class _Factors(NamedTuple):
     """A = L D Lᵀ: the rows of L left of its diagonal of ones, and D⁻¹."""
 

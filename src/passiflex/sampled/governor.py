@@ -64,45 +64,92 @@ def govern_pose(
     more than the budget, `HALVINGS` bisections look for γ from γ = 0, which costs nothing; what they return
     is always affordable. With γ = 1 the value is x_d to the last bit.
     """
-    path = _path(task)
-    constants = (*pose, *held, *wanted, stiffness)
+    way = _way(task, pose, held, wanted, stiffness)
     whole = task.potential(pose, wanted, stiffness) - task.potential(pose, held, stiffness)
     enough = _price(whole, signed) <= budget
-    low, high, cost = cs.SX(0), cs.SX(1), cs.SX(0)
-    for _ in range(HALVINGS):
-        middle = (low + high) / 2
-        at_middle = path(middle, *constants)[0]
-        affordable = _price(at_middle, signed) <= budget
-        low, high = cs.if_else(affordable, middle, low), cs.if_else(affordable, high, middle)
-        cost = cs.if_else(affordable, at_middle, cost)
-    _, position, rotation = path(low, *constants)
+    low = cs.SX(0)
+    for k in range(1, HALVINGS + 1):
+        step = 2.0**-k
+        affordable = _price(way.cost(low + step), signed) <= budget
+        low += step * affordable
+    reached = way.point(low)
     value = EndEffectorPose(
-        cs.if_else(enough, wanted.position, position), cs.if_else(enough, wanted.rotation, rotation)
+        *(cs.if_else(enough, there, short) for there, short in zip(wanted, reached, strict=True))
     )
-    return Governed(value, cs.if_else(enough, 1, low), cs.if_else(enough, whole, cost))
+    return Governed(value, cs.if_else(enough, 1, low), cs.if_else(enough, whole, way.cost(low)))
 
 
 def _price(stored: cs.SX, signed: cs.SX) -> cs.SX:
-    return cs.if_else(signed > 0, stored, cs.fabs(stored))
+    return cs.fmax(stored, cs.if_else(signed > 0, 1, -1) * stored)
 
 
-def _path(task: AbstractTask) -> cs.Function:
-    """Return (γ, pose, held, wanted, K_x) → (ΔU, position, rotation) at the share γ of the way."""
-    gamma = cs.SX.sym("gamma")
-    poses = [EndEffectorPose(cs.SX.sym(f"p{i}", 3), cs.SX.sym(f"R{i}", 3, 3)) for i in range(3)]
-    pose, held, wanted = poses
-    stiffness = cs.SX.sym("K", task.size, task.size)
+class _Way(NamedTuple):
+    """The way from one reference to another: straight, and by the shortest turn.
+
+    A point on it is linear in (γ, sin γψ, 1 − cos γψ), and a potential is quadratic in a point: what it costs to come
+    as far as γ takes as many products as these three have, however many the potential takes.
+
+    Attributes
+    ----------
+    begin, straight, first, second: x̂_d, then what γ, sin γψ and 1 − cos γψ add to its position and its axes.
+    angle: ψ [rad].
+    slope, curvature: First and second derivatives of ΔU by the three, (3,) and (3, 3) [J].
+    """
+
+    begin: EndEffectorPose
+    straight: cs.SX
+    first: cs.SX
+    second: cs.SX
+    angle: cs.SX
+    slope: cs.SX
+    curvature: cs.SX
+
+    def _coordinates(self, share: cs.SX) -> cs.SX:
+        return cs.vertcat(share, cs.sin(share * self.angle), 1 - cs.cos(share * self.angle))
+
+    def point(self, share: cs.SX) -> EndEffectorPose:
+        """Return the reference at γ."""
+        gamma, sine, versine = cs.vertsplit(self._coordinates(share))
+        return EndEffectorPose(
+            self.begin.position + gamma * self.straight,
+            self.begin.rotation + sine * self.first + versine * self.second,
+        )
+
+    def cost(self, share: cs.SX) -> cs.SX:
+        """Return ΔU at γ [J]."""
+        z, C = self._coordinates(share), self.curvature
+        rising = (C[i, i] / 2 * z[i] + sum(C[i, j] * z[j] for j in range(i + 1, 3)) for i in range(3))
+        return sum(z[i] * (self.slope[i] + more) for i, more in enumerate(rising))
+
+
+def _way(
+    task: AbstractTask,
+    pose: EndEffectorPose,
+    held: EndEffectorPose,
+    wanted: EndEffectorPose,
+    stiffness: cs.SX,
+) -> _Way:
+    """Return the way from a reference to another, and what it costs."""
     relative = wanted.rotation @ held.rotation.T
     sine, axis = _sine_and_axis(relative)
-    angle = gamma * cs.atan2(sine, (cs.trace(relative) - 1) / 2)
     first = cs.skew(axis) @ held.rotation
-    second = cs.skew(axis) @ first
-    point = EndEffectorPose(
-        held.position + gamma * (wanted.position - held.position),
-        held.rotation + cs.sin(angle) * first + (1 - cs.cos(angle)) * second,
+    way = _Way(
+        begin=held,
+        straight=wanted.position - held.position,
+        first=first,
+        second=cs.skew(axis) @ first,
+        angle=cs.atan2(sine, (cs.trace(relative) - 1) / 2),
+        slope=cs.SX(3, 1),
+        curvature=cs.SX(3, 3),
     )
-    cost = task.potential(pose, point, stiffness) - task.potential(pose, held, stiffness)
-    return cs.Function("path", [gamma, *pose, *held, *wanted, stiffness], [cost, *point])
+    z = cs.SX.sym("z", 3)
+    point = EndEffectorPose(
+        held.position + z[0] * way.straight, held.rotation + z[1] * way.first + z[2] * way.second
+    )
+    curvature, slope = cs.hessian(task.potential(pose, point, stiffness), z)
+    assert not cs.depends_on(curvature, z), "a potential is quadratic in the reference"
+    curvature, slope = (cs.substitute(derivative, z, cs.SX.zeros(3)) for derivative in (curvature, slope))
+    return way._replace(slope=slope, curvature=curvature)
 
 
 def _sine_and_axis(rotation: cs.SX) -> tuple[cs.SX, cs.SX]:
