@@ -12,7 +12,7 @@ from collections.abc import Callable
 import passiflex as pf
 from passiflex.limits import limit_map
 from passiflex.limits.recommend_for import recommend_for
-from passiflex.simulation.linear_loop import LinearLoop
+from passiflex.stability.linear_loop import LinearLoop
 
 RUNS = 2
 """The first compiles; the last one counts."""

@@ -10,9 +10,9 @@ from rich.table import Table
 from arithmetic import Ops, longest_chain, operations
 from lane_parts import Alone, Code, Part, code_of, parts_of, timing_text
 from multiply_add import Rates, core_rates
+from passiflex.loops.compiled import compiled_sampled_loop
 from passiflex.native import compile_source
 from passiflex.simulation import Problem
-from passiflex.simulation.compiled import compiled_sampled_loop
 from passiflex.simulation.simulate_sampled import longest_step
 
 

@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from multiply_add import cpu_seconds
+from passiflex.loops.compiled import compiled_sampled_loop
 from passiflex.native import Change, LaneInputs
 from passiflex.native.lane_source import lane_source
 from passiflex.simulation import Problem
 from passiflex.simulation.batch import lane_loop
-from passiflex.simulation.compiled import compiled_sampled_loop
 from passiflex.simulation.rows import Chance, Rows, orders
 from passiflex.simulation.simulate_sampled import longest_step, start
 

@@ -13,9 +13,9 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from passiflex.loops.compiled import CompiledSampledLoop, compiled_sampled_loop
 from passiflex.native import HeldLoop, NativeFunction
 from passiflex.simulation import Problem, simulate_problem
-from passiflex.simulation.compiled import CompiledSampledLoop, compiled_sampled_loop
 from passiflex.simulation.rows import Rows
 from passiflex.simulation.simulate_sampled import longest_step, start
 from speed import Row, by_turns, machine, median_times, problem_of

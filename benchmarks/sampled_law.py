@@ -17,8 +17,8 @@ import yaml
 from numpy.typing import NDArray
 
 import plain
+from passiflex.scenarios.scenario_file import parse_scenario
 from passiflex.simulation import Problem, resolve
-from passiflex.simulation.scenario_file import parse_scenario
 
 Array = NDArray[np.float64]
 

@@ -28,6 +28,7 @@ from rich.console import Console
 from rich.table import Table
 
 import plain
+from passiflex.loops.motion import MOTION
 from passiflex.native import DRIVER, NativeFunction, find_compiler, library
 from passiflex.simulation import (
     CompiledLoop,
@@ -38,7 +39,6 @@ from passiflex.simulation import (
     resolve,
     simulate_problem,
 )
-from passiflex.simulation.motion import MOTION
 
 Array = NDArray[np.float64]
 SAME = 1e-8

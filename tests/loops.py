@@ -13,11 +13,11 @@ from arms import serial_chains
 from passiflex.control import AbstractLaw, EnergyTank
 from passiflex.control.inner_loop import shaped_motion
 from passiflex.control.tank import NO_CAP
+from passiflex.loops.motion import reference_at
 from passiflex.robots.arm import SerialArm
 from passiflex.robots.chain import SerialChain
 from passiflex.robots.flexible import FlexibleJointRobot
 from passiflex.simulation import ClosedLoop
-from passiflex.simulation.motion import reference_at
 
 GRAVITY = (0.7, -0.4, -9.81)
 SEEDS = st.integers(0, 2**32 - 1)

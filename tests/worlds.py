@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import yaml
 
+from passiflex.runs.sound import NOTED
 from passiflex.simulation import Run, Scenario, parse_scenario, simulate
-from passiflex.simulation.sound import NOTED
 
 PERIOD = 1e-3
 PLAIN = """\

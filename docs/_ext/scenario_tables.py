@@ -1,7 +1,7 @@
 """The directives `scenario-table`, the entries of one section of a scenario file, and `tank-table`, read from the code.
 
 A table cannot differ from the package: key, what may be written, default and meaning are those of
-`passiflex.simulation.scenario`.
+`passiflex.scenarios.scenario`.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from pydantic.fields import FieldInfo
 from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
-from passiflex.simulation.scenario import Scenario
-from passiflex.simulation.tank_settings import TankSettings
-from passiflex.simulation.tank_uses import CONTINUOUS, SAMPLED, Uses
+from passiflex.scenarios.scenario import Scenario
+from passiflex.scenarios.tank_settings import TankSettings
+from passiflex.scenarios.tank_uses import CONTINUOUS, SAMPLED, Uses
 from passiflex.texts.quantity import Quantity
 
 COLUMNS = (("key", 22), ("write", 30), ("default", 12), ("meaning", 36))

@@ -14,15 +14,15 @@ def lazy_names(
 
     Parameters
     ----------
-    homes: Name → the module of the package that has it. A module must not have the name of one of them: importing
-        it would put the module in the place of the name.
+    homes: Name → the module of the package that has it; with a dot before it, one beside the package. A module must
+        not have the name of one of them: importing it would put the module in the place of the name.
     """
     own = vars(sys.modules[package])
 
     def get(name: str) -> object:
         if name not in homes:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
-        own[name] = value = getattr(import_module(f"{package}.{homes[name]}"), name)
+        own[name] = value = getattr(import_module(f".{homes[name]}", package), name)
         return value
 
     return get, lambda: sorted({*own, *homes})

@@ -14,11 +14,11 @@ import pytest
 import passiflex
 from passiflex.campaigns import measures as module
 from passiflex.campaigns.measures import MEASURES, SIGNALS, measures
+from passiflex.problems.problem import Event
 from passiflex.responses.msd import ideal_response
 from passiflex.responses.steps import step_window
 from passiflex.simulation import Run, Scenario, resolve, simulate_problem
 from passiflex.simulation.batch import digest_batch, simulate_in_lane
-from passiflex.simulation.problem import Event
 from worlds import merged, world
 
 TEXTS = {"verdict", "decided_by", "failure"}

@@ -22,8 +22,8 @@ from passiflex.campaigns.search import DISTINCT, search
 from passiflex.cli.campaign_tables import found_table
 from passiflex.errors import NameUnknownError, ValueRangeError
 from passiflex.files import OutputError
+from passiflex.scenarios.scenario import Scenario
 from passiflex.simulation import load_scenario, resolve, simulate
-from passiflex.simulation.scenario import Scenario
 from worlds import merged
 
 FORCE, VARIANCE, LOOP = "forces.1.force.1", "noise.torque_variance", "control.inner_loop"

@@ -64,7 +64,7 @@ def test_a_mistake_in_a_scenario_is_told_before_anything_else_is_imported(unit: 
     path = tmp_path / "wrong.yaml"
     path.write_text(PLANAR.replace("[0, 0, 0.05]", f"[0{unit}, 0{unit}, 5{unit}]") + "durration: 3\n")
     imported = modules_of("simulate", str(path), "--out", str(tmp_path / "run.nc"))
-    assert "passiflex.simulation.scenario" in imported
+    assert "passiflex.scenarios.scenario" in imported
     packages = {name.split(".")[0] for name in imported}
     assert {"numpy", "pydantic", "yaml"} <= packages
     rare = unit == " km"

@@ -9,10 +9,10 @@ from hypothesis import given, settings
 
 from loops import GRAVITY, SEEDS, robots
 from passiflex.control import AbstractGravity, MotorGravity, RobotGravity, StaticGravity
+from passiflex.problems.posture import posture
 from passiflex.robots.flexible import FlexibleJointRobot
 from passiflex.simulation import Scenario, resolve
 from passiflex.simulation import simulate as simulate_scenario
-from passiflex.simulation.posture import posture
 
 STEPS = StaticGravity().steps
 DISPLACEMENT = np.array([0.03, -0.02, 0.1])

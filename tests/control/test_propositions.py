@@ -27,9 +27,9 @@ from passiflex.control import (
     StaticGravity,
 )
 from passiflex.control.systems import augmented_system, impedance_system, shaped_system
+from passiflex.loops.closed_loop import ENERGIES
 from passiflex.phs import PortHamiltonianSystem
 from passiflex.robots.flexible import FlexibleJointRobot
-from passiflex.simulation.closed_loop import ENERGIES
 
 RELATIVE = 1e-9
 TASKS = (PoseTask(), PositionTask(), PoseTask(free=(0, 5)))

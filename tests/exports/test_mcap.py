@@ -18,8 +18,8 @@ from passiflex.exports import export_run
 from passiflex.exports.ros2_definitions import PARTS, definition_of
 from passiflex.robots import SerialChain
 from passiflex.robots.frames import world_frames
+from passiflex.runs.run_arm import chain_of
 from passiflex.simulation import Run
-from passiflex.simulation.run_arm import chain_of
 
 Messages = dict[str, list[tuple[int, Any]]]
 

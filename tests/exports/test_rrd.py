@@ -19,8 +19,8 @@ from passiflex.exports.signals import signals_of
 from passiflex.passivity import audit
 from passiflex.robots.frames import world_frames
 from passiflex.robots.solids import solids, with_solids
+from passiflex.runs.run_arm import chain_of
 from passiflex.simulation import Run
-from passiflex.simulation.run_arm import chain_of
 from passiflex.views import KINDS, Viewed, ideal_motion, panels
 
 Columns = dict[str, dict[str, Any]]

@@ -8,9 +8,9 @@ import pytest
 from passiflex.limits.box_slopes import steepest
 from passiflex.limits.margin_box import MarginBox, Member
 from passiflex.simulation import resolve
-from passiflex.simulation.linear_loop import LinearLoop
-from passiflex.simulation.loop_at_rest import standing
-from passiflex.simulation.modes import trembles
+from passiflex.stability.linear_loop import LinearLoop
+from passiflex.stability.loop_at_rest import standing
+from passiflex.stability.modes import trembles
 from worlds import world
 
 

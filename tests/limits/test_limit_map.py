@@ -19,11 +19,11 @@ from passiflex.limits.confirmation import VISIBLE, Confirmation, confirm, distur
 from passiflex.limits.limit_map import DAMPING_SCALES, INERTIA_RATIOS, STIFFNESS_RATIOS, STIFFNESS_SCALES
 from passiflex.limits.planes import Plane, least_inertias, scaled_impedance, stable_damping, within
 from passiflex.limits.subject import sampled_problem, with_task
+from passiflex.problems.altered import altered
 from passiflex.simulation import Problem, parse_scenario, resolve
 from passiflex.simulation import admissible as border
-from passiflex.simulation.admissible import shaping
-from passiflex.simulation.altered import altered
-from passiflex.simulation.linear_loop import LinearLoop
+from passiflex.stability.admissible import shaping
+from passiflex.stability.linear_loop import LinearLoop
 from worlds import PLAIN, merged, world
 
 HALF = 0.5e-3

@@ -21,7 +21,7 @@ from passiflex.limits.torque_noise import rms_torque, torque_by_noise
 from passiflex.limits.workspace import workspace_postures
 from passiflex.robots import FlexibleJointRobot
 from passiflex.simulation import Problem, parse_scenario, resolve, simulate, simulate_problem
-from passiflex.simulation.linear_loop import DrivenLoop, LinearLoop
+from passiflex.stability.linear_loop import DrivenLoop, LinearLoop
 from worlds import merged, world
 
 RATE, DELAY, MARGIN = 1000.0, 1e-3, 0.2

@@ -15,10 +15,10 @@ from hypothesis import strategies as st
 
 from passiflex.passivity import Audit, audit, available_energy
 from passiflex.passivity.extremes import extremes, extremes_of_rows
+from passiflex.problems.resolution import resolve
 from passiflex.simulation import Run, parse_scenario, salvage, simulate
 from passiflex.simulation.batch import simulate_batch, simulate_in_lane
 from passiflex.simulation.integrate import Stretch, smooth_stretch
-from passiflex.simulation.resolution import resolve
 from worlds import PERIOD, by_rows, merged, planar_text, ran, world
 
 JUDGED = ("verdict", "time", "term", "margin", "margin_time", "integration_error", "books_error")

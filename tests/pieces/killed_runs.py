@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-import passiflex.simulation.run  # noqa: F401 (a new campaign asks it for the commit)
+import passiflex.runs.run  # noqa: F401 (a new campaign asks it for the commit)
 from pieces.cheap_campaign import run
 
 LONGEST = 0.3

@@ -17,8 +17,8 @@ from passiflex.limits.own_margin import OwnMargin
 from passiflex.limits.planes import Interval, Plane
 from passiflex.plotting.figures import save_figure
 from passiflex.plotting.limits import draw_limits
-from passiflex.simulation.judgement import Judgement
-from passiflex.simulation.modes import Spectrum
+from passiflex.stability.judgement import Judgement
+from passiflex.stability.modes import Spectrum
 
 RATIOS, INERTIAS = np.array([0.5, 1.0, 2.0]), np.array([0.01, 0.1, 1.0])
 SCALES, DAMPINGS = np.array([0.1, 1.0, 10.0]), np.array([0.1, 1.0, 10.0, 100.0])

@@ -12,8 +12,8 @@ from arms import serial_chains
 from passiflex.reports.arm import arm_header
 from passiflex.robots import SerialChain
 from passiflex.robots.frames import world_frames
+from passiflex.runs.run_arm import chain_of
 from passiflex.simulation import Run, parse_scenario, simulate
-from passiflex.simulation.run_arm import chain_of
 from reports.pages import PLANAR, baseline, changed, continuous, page
 
 

@@ -15,7 +15,7 @@ from playwright.sync_api import Browser, BrowserContext, Playwright, sync_playwr
 
 from passiflex import Run, audit, load_scenario, shipped_scenario, simulate
 from passiflex.reports import write_report
-from passiflex.simulation.scenario import Tool
+from passiflex.scenarios.scenario import Tool
 from reports.browser import (
     CANVAS,
     DESKTOP,

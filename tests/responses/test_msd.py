@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 import scipy.linalg
 
+from passiflex.loops.motion import Motion, Pose, circle, hold, minimum_jerk
+from passiflex.problems.gains import target_inertia
+from passiflex.problems.problem import Event
 from passiflex.responses.msd import IdealResponse, ideal_response
-from passiflex.simulation.gains import target_inertia
-from passiflex.simulation.motion import Motion, Pose, circle, hold, minimum_jerk
-from passiflex.simulation.problem import Event
 
 M, D, K = 3.4, 20.0, 60.0
 OMEGA = np.sqrt(K / M)

@@ -10,8 +10,8 @@ import pytest
 import yaml
 
 from passiflex.control.tank import smoothstep
+from passiflex.problems.posture import posture
 from passiflex.simulation import Run, Scenario, parse_scenario, resolve, simulate
-from passiflex.simulation.posture import posture
 from passiflex.studies import shipped_scenario
 from worlds import books, merged, ran, same, world
 

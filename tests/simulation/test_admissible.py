@@ -12,8 +12,9 @@ import pytest
 import yaml
 
 from passiflex.errors import UnstableLoopError, ValueRangeError
+from passiflex.problems.altered import altered
 from passiflex.simulation import parse_scenario, resolve, simulate_problem
-from passiflex.simulation.admissible import (
+from passiflex.stability.admissible import (
     INERTIA_RATIOS,
     Admissible,
     check,
@@ -21,12 +22,11 @@ from passiflex.simulation.admissible import (
     require_stable,
     shaping,
 )
-from passiflex.simulation.altered import altered
-from passiflex.simulation.causes import Advice
-from passiflex.simulation.judgement import Judgement
-from passiflex.simulation.linear_loop import LinearLoop
-from passiflex.simulation.modes import Spectrum
-from passiflex.simulation.remedies import Remedy
+from passiflex.stability.causes import Advice
+from passiflex.stability.judgement import Judgement
+from passiflex.stability.linear_loop import LinearLoop
+from passiflex.stability.modes import Spectrum
+from passiflex.stability.remedies import Remedy
 from worlds import world
 
 MATCHED = {"inner_loop": "matched", "external_torque": "none"}

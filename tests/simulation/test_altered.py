@@ -9,12 +9,12 @@ import pytest
 import yaml
 
 from passiflex.errors import NameUnknownError, PassiflexError, SizeError, ValueRangeError
+from passiflex.loops.motion import pose_at
+from passiflex.loops.sampled_loop import SampledLoop
+from passiflex.problems.altered import MOST_PERIODS, altered, at_rate
+from passiflex.problems.posture import posture
 from passiflex.sampled.matched_loop import MatchedInnerLoop
 from passiflex.simulation import Problem, parse_scenario, resolve
-from passiflex.simulation.altered import MOST_PERIODS, altered, at_rate
-from passiflex.simulation.motion import pose_at
-from passiflex.simulation.posture import posture
-from passiflex.simulation.sampled_loop import SampledLoop
 from worlds import PLAIN, world
 
 FALLBACK = {"shaped_inertia": {"ratio": 2}, "damping": {"translation": 70}}

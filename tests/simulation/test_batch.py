@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from passiflex.errors import NameUnknownError, SimulationError
+from passiflex.loops.compiled import compiled_sampled_loop
 from passiflex.native import find_compiler
+from passiflex.problems.altered import altered
+from passiflex.problems.problem import Problem
 from passiflex.simulation import Run, batch, resolve
-from passiflex.simulation.altered import altered
 from passiflex.simulation.batch import Recording, digest_batch, lane_loop, simulate_batch
-from passiflex.simulation.compiled import compiled_sampled_loop
-from passiflex.simulation.problem import Problem
 from passiflex.simulation.simulate_sampled import longest_step, simulate_unchecked
 from passiflex.studies.paper import shipped_scenario
 from worlds import PERIOD, merged, world

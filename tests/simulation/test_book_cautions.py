@@ -11,7 +11,7 @@ from passiflex.simulation import book_cautions as book_cautions_module
 from passiflex.simulation import resolve
 from passiflex.simulation.book_cautions import book_cautions
 from passiflex.simulation.cautions import cautions
-from passiflex.simulation.noise_credit import POSTURES, noise_credit
+from passiflex.stability.noise_credit import POSTURES, noise_credit
 from passiflex.studies import shipped_scenario
 from worlds import merged, world
 

@@ -13,8 +13,8 @@ import yaml
 
 import passiflex as pf
 from passiflex.errors import ArgumentError, FrozenError, PassiflexError, ScenarioError
+from passiflex.scenarios.scenario import Force
 from passiflex.simulation import Scenario, parse_scenario
-from passiflex.simulation.scenario import Force
 from worlds import PLAIN, PLANAR, merged
 
 MATRIX = np.diag([30.0, 60, 90]).tolist()

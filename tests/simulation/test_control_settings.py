@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from passiflex.errors import PassiflexError, ScenarioError, SizeError
+from passiflex.scenarios.control_settings import Fallback, SensorSettings
+from passiflex.scenarios.tank_settings import TankSettings
 from passiflex.simulation import Scenario, parse_scenario, resolve
-from passiflex.simulation.control_settings import Fallback, SensorSettings
-from passiflex.simulation.tank_settings import TankSettings
 from passiflex.studies import shipped_scenario
 
 GOOD = """\

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from passiflex.errors import SizeError
+from passiflex.problems.altered import altered
+from passiflex.problems.posture import posture
+from passiflex.problems.resolution import SCALED
 from passiflex.robots.flexible import RobotState
 from passiflex.simulation import ClosedLoop, Problem, parse_scenario, resolve, simulate
-from passiflex.simulation.altered import altered
-from passiflex.simulation.posture import posture
-from passiflex.simulation.resolution import SCALED
 from worlds import world
 
 CONTINUOUS: dict[str, Any] = {"control": None, "tank": None}

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import scipy.linalg
 
-from passiflex.simulation.exponential import exponential
+from passiflex.stability.exponential import exponential
 
 
 @pytest.mark.parametrize("time", [0.0, 1e-6, 1e-3, 0.05])

@@ -11,11 +11,11 @@ import yaml
 
 from passiflex.errors import UnstableLoopError
 from passiflex.passivity import audit
+from passiflex.problems.altered import rewritten
+from passiflex.problems.posture import posture
 from passiflex.simulation import Run, parse_scenario, resolve, simulate, simulate_problem, simulate_sampled
-from passiflex.simulation.altered import rewritten
-from passiflex.simulation.causes import advise
-from passiflex.simulation.judgement import judge
-from passiflex.simulation.posture import posture
+from passiflex.stability.causes import advise
+from passiflex.stability.judgement import judge
 from passiflex.studies import shipped_scenario
 from passiflex.studies.sampled import VARIANTS
 from worlds import books, merged, ran, world

@@ -12,11 +12,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from passiflex.errors import SimulationError
+from passiflex.loops.closed_loop import ENERGIES
+from passiflex.loops.motion import circle
 from passiflex.native import fastest_pole
 from passiflex.simulation import CompiledLoop, Problem, Run, Scenario, compiled_loop, resolve, simulate
-from passiflex.simulation.closed_loop import ENERGIES
 from passiflex.simulation.integrate import SLOW_POLE, held_stretch, resolved_stretch, smooth_stretch
-from passiflex.simulation.motion import circle
 
 CIRCLE = {"at": 0.1, "kind": "circle", "plane": ["x", "z"], "radius": 0.05, "period": 0.7}
 

@@ -9,13 +9,13 @@ import pytest
 
 from ladders import ladder
 from passiflex.errors import UnstableLoopError
+from passiflex.problems.altered import rewritten, with_flange
 from passiflex.simulation import Problem, parse_scenario, resolve
-from passiflex.simulation.admissible import check, require_stable
-from passiflex.simulation.altered import rewritten, with_flange
-from passiflex.simulation.causes import advise
-from passiflex.simulation.judgement import holds, judge, judged_fallback
-from passiflex.simulation.linear_loop import LinearLoop
 from passiflex.simulation.stability_cautions import stability_cautions
+from passiflex.stability.admissible import check, require_stable
+from passiflex.stability.causes import advise
+from passiflex.stability.judgement import holds, judge, judged_fallback
+from passiflex.stability.linear_loop import LinearLoop
 from worlds import world
 
 

@@ -16,10 +16,10 @@ from passiflex.robots import FlexibleJointRobot
 from passiflex.robots.arm import SerialArm
 from passiflex.robots.chain import Body, Joint, SerialChain
 from passiflex.simulation import Problem, parse_scenario, resolve
-from passiflex.simulation.law_slope import REMEMBERED
-from passiflex.simulation.linear_loop import LinearLoop
-from passiflex.simulation.loop_at_rest import loop_at_rest
 from passiflex.simulation.simulate_sampled import longest_step, start
+from passiflex.stability.law_slope import REMEMBERED
+from passiflex.stability.linear_loop import LinearLoop
+from passiflex.stability.loop_at_rest import loop_at_rest
 from passiflex.studies import shipped_scenario
 from worlds import merged, world
 

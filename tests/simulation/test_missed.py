@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 
 from passiflex.errors import UnstableLoopError
 from passiflex.simulation import resolve, simulate
-from passiflex.simulation.judgement import judge
-from passiflex.simulation.linear_loop import LinearLoop
-from passiflex.simulation.missed import _certified, dies_out, gaps, stationary
-from passiflex.simulation.timing import Timing
+from passiflex.stability.judgement import judge
+from passiflex.stability.linear_loop import LinearLoop
+from passiflex.stability.missed import _certified, dies_out, gaps, stationary
+from passiflex.stability.timing import Timing
 from worlds import world
 
 LIGHT: dict[str, Any] = {

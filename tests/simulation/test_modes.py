@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from passiflex.simulation.modes import Modes, coupled, projector
+from passiflex.stability.modes import Modes, coupled, projector
 
 T = 1e-3
 TASK = np.array([[1.0, 1.0, 0.0]])

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from passiflex.native import FixedStep
+from passiflex.problems.posture import posture
 from passiflex.robots.chain import SerialChain, rotation_of
 from passiflex.robots.flexible import FlexibleJointRobot, RobotState
-from passiflex.simulation.posture import posture
 
 HOLD = 5e-4
 """Torques are held this long in both simulators, so that both solve the same problem exactly."""

@@ -9,11 +9,11 @@ import pytest
 
 from passiflex.passivity import audit, overclaimed
 from passiflex.sampled.measurement_bound import SIGMAS
+from passiflex.scenarios.law_settings import ShapedInertia
+from passiflex.scenarios.scenario import Noise
 from passiflex.simulation import resolve, simulate
-from passiflex.simulation.law_settings import ShapedInertia
-from passiflex.simulation.linear_loop import DrivenLoop, LinearLoop
-from passiflex.simulation.noise_credit import POSTURES, REACH, charged, mean_credit, noise_credit
-from passiflex.simulation.scenario import Noise
+from passiflex.stability.linear_loop import DrivenLoop, LinearLoop
+from passiflex.stability.noise_credit import POSTURES, REACH, charged, mean_credit, noise_credit
 from passiflex.studies import shipped_scenario
 from worlds import PERIOD, merged, ran, world
 

@@ -14,11 +14,11 @@ from passiflex.control.law import ImpedanceLaw
 from passiflex.control.rigid import RigidImpedanceLaw
 from passiflex.control.tank import NO_CAP, EnergyTank
 from passiflex.errors import NameUnknownError, PassiflexError, ScenarioError, SizeError, ValueRangeError
+from passiflex.loops.motion import pose_at
+from passiflex.problems.gains import target_inertia
+from passiflex.problems.posture import natural_inertia, posture
 from passiflex.robots import FlexibleJointRobot
 from passiflex.simulation import ClosedLoop, Problem, Scenario, parse_scenario, resolve
-from passiflex.simulation.gains import target_inertia
-from passiflex.simulation.motion import pose_at
-from passiflex.simulation.posture import natural_inertia, posture
 from passiflex.studies import shipped_scenario
 
 POSTURE = [0, 0.6, 0, -1.2, 0, 1.0, 0]

@@ -17,12 +17,12 @@ import yaml
 
 from passiflex.errors import FrozenError, RunFileError, SimulationError
 from passiflex.files import OutputError
+from passiflex.origin import package_version, source_commit
 from passiflex.passivity import audit
 from passiflex.robots.arm import SerialArm
 from passiflex.robots.chain import SerialChain
+from passiflex.runs.run_file import FORMAT
 from passiflex.simulation import Run, Scenario, parse_scenario, simulate
-from passiflex.simulation.run import package_version, source_commit
-from passiflex.simulation.run_file import FORMAT
 from worlds import planar_text
 
 PLANAR = planar_text(reference=[{"at": 0.2, "kind": "step", "by": [0, 0, 0.05]}], duration=1)

@@ -12,8 +12,8 @@ import pytest
 
 from passiflex.robots.catalogue import read_description
 from passiflex.robots.frames import world_frames
+from passiflex.runs.run_arm import chain_of
 from passiflex.simulation import Run, parse_scenario, simulate
-from passiflex.simulation.run_arm import chain_of
 from worlds import PLANAR
 
 SCENARIO = f"{PLANAR}tool: {{position: [0.05, 0, 0.02], rotation_vector: [0, 0.3, 0]}}\n"

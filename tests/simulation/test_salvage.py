@@ -12,9 +12,9 @@ import xarray as xr
 
 from passiflex.errors import RunFileError
 from passiflex.passivity import audit
+from passiflex.runs.run_file import FORMAT
+from passiflex.runs.salvaged import salvage
 from passiflex.simulation import Run, parse_scenario, simulate
-from passiflex.simulation.run_file import FORMAT
-from passiflex.simulation.salvaged import salvage
 from worlds import PLANAR
 
 

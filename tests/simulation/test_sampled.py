@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from passiflex.loops.compiled import compiled_sampled_loop
 from passiflex.passivity import Balance, link_balance, robot_balance
+from passiflex.problems.problem import Problem
 from passiflex.simulation import Run, resolve, simulate_problem, simulate_sampled
-from passiflex.simulation.compiled import compiled_sampled_loop
-from passiflex.simulation.problem import Problem
 from worlds import PERIOD, books, ran, same, world
 
 RATES = (1000, 2000, 4000, 8000)

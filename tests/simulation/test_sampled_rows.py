@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from passiflex.loops.compiled import compiled_sampled_loop
+from passiflex.loops.recorded import sample_parts
+from passiflex.loops.sampled_loop import SampledLoop
 from passiflex.robots.arm import SerialArm
 from passiflex.simulation import ClosedLoop, resolve
-from passiflex.simulation.compiled import compiled_sampled_loop
-from passiflex.simulation.recorded import sample_parts
 from passiflex.simulation.rows import Rows
-from passiflex.simulation.sampled_loop import SampledLoop
 from worlds import PERIOD, world
 
 NOISE = {"noise": {"torque_variance": 0.25, "hold": PERIOD}}

@@ -12,11 +12,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from passiflex.errors import ScenarioError
-from passiflex.simulation.law_settings import ImpedanceSettings, RigidSettings
-from passiflex.simulation.model_errors import Deviations, ModelErrors
-from passiflex.simulation.noise_settings import Noise
-from passiflex.simulation.scenario import Circle, Hold, Move, Scenario, Step, TankSettings
-from passiflex.simulation.scenario_file import load_scenario, parse_scenario
+from passiflex.scenarios.law_settings import ImpedanceSettings, RigidSettings
+from passiflex.scenarios.model_errors import Deviations, ModelErrors
+from passiflex.scenarios.noise_settings import Noise
+from passiflex.scenarios.scenario import Circle, Hold, Move, Scenario, Step, TankSettings
+from passiflex.scenarios.scenario_file import load_scenario, parse_scenario
 from passiflex.texts.text_file import MAX_BYTES
 
 GOOD = """\

@@ -21,8 +21,8 @@ from passiflex.robots.flexible import FlexibleJointRobot
 from passiflex.sampled.controller import SampledController
 from passiflex.sampled.signals import ControlParameters, Wish
 from passiflex.sampled.tanks import TANKS
+from passiflex.scenarios.tank_uses import CONTINUOUS, SAMPLED
 from passiflex.simulation import parse_scenario
-from passiflex.simulation.tank_uses import CONTINUOUS, SAMPLED
 from worlds import PLAIN, merged, planar_text
 
 UNUSUAL: dict[str, Any] = {

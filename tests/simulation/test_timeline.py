@@ -8,10 +8,10 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
+from passiflex.loops.motion import Pose
+from passiflex.problems.timeline import timeline
+from passiflex.scenarios.scenario import Force
 from passiflex.simulation import Scenario, parse_scenario
-from passiflex.simulation.motion import Pose
-from passiflex.simulation.scenario import Force
-from passiflex.simulation.timeline import timeline
 from work import calls
 from worlds import PLANAR
 

@@ -8,8 +8,8 @@ import pytest
 import yaml
 
 from passiflex.passivity import audit
+from passiflex.problems.unbooked import NOTHING, UNKNOWN, listed, unbooked
 from passiflex.simulation import Run, parse_scenario, resolve, simulate
-from passiflex.simulation.unbooked import NOTHING, UNKNOWN, listed, unbooked
 from worlds import PERIOD, planar_text, world
 
 NOISE: dict[str, Any] = {"noise": {"torque_variance": 0.04, "hold": PERIOD}}

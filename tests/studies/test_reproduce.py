@@ -121,7 +121,7 @@ def test_fig_1_beside_what_was_there(tmp_path: Path) -> None:
 
 
 def _source() -> dict[str, str]:
-    from passiflex.simulation.run import package_version, source_commit
+    from passiflex.origin import package_version, source_commit
 
     return {"version": package_version(), "commit": source_commit()}
 

@@ -12,8 +12,8 @@ from passiflex.campaigns import columns, draws, require_possible, sample_scenari
 from passiflex.control.law import ImpedanceLaw
 from passiflex.control.rigid import RigidImpedanceLaw
 from passiflex.limits.workspace import REGULAR
+from passiflex.problems.posture import posture
 from passiflex.simulation import resolve
-from passiflex.simulation.posture import posture
 from passiflex.studies.reproduce import reproduce
 from passiflex.studies.uncertainty import (
     RESPONSE,

@@ -207,7 +207,7 @@ def test_numbers_in_the_unit_itself_are_not_changed(number):
 def test_pint_is_not_imported_before_it_is_needed():
     code = """
 import sys
-import passiflex.simulation.scenario_file
+import passiflex.scenarios.scenario_file
 from passiflex.texts.quantity import Quantity
 Quantity("s").convert("3 ms")
 assert "pint" not in sys.modules

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from passiflex.errors import NameUnknownError
+from passiflex.runs.run_arm import chain_of
 from passiflex.simulation import Run
-from passiflex.simulation.run_arm import chain_of
 from passiflex.views import KINDS, Panel, Viewed, panels
 from views.seen import KINDS_OF_RUN, altered, continuous, held_back, made_up, rigid, without
 

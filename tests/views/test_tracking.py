@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from passiflex.campaigns.measures import _ideal
+from passiflex.problems.gains import target_inertia
 from passiflex.simulation import Run, parse_scenario, resolve
-from passiflex.simulation.gains import target_inertia
 from passiflex.views import Panel, Viewed, ideal_motion, panels, roles_of, viewed
 from passiflex.views.tracking import orientation_error
 from views.seen import (

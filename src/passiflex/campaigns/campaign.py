@@ -12,8 +12,8 @@ from passiflex.campaigns.distributions import Distribution
 from passiflex.campaigns.measures import MEASURES
 from passiflex.campaigns.parameters import checked
 from passiflex.campaigns.target import Target, complete_data, locate
-from passiflex.simulation.control_settings import Seconds
-from passiflex.simulation.scenario import Scenario
+from passiflex.scenarios.control_settings import Seconds
+from passiflex.scenarios.scenario import Scenario
 from passiflex.texts.model_mistakes import word
 from passiflex.texts.section import Mistakes, Section
 

@@ -10,8 +10,8 @@ from pydantic import ValidationError
 from passiflex.campaigns.campaign import Campaign
 from passiflex.errors import ScenarioError
 from passiflex.files import as_path
-from passiflex.simulation.scenario import Scenario
-from passiflex.simulation.scenario_file import load_scenario, read_scenario, read_text
+from passiflex.scenarios.scenario import Scenario
+from passiflex.scenarios.scenario_file import load_scenario, read_scenario, read_text
 from passiflex.texts.kinds import of_another_kind
 from passiflex.texts.model_mistakes import explained
 from passiflex.texts.quantity import shown

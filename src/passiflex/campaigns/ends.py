@@ -9,7 +9,7 @@ from pydantic import ValidationError
 
 from passiflex.campaigns.distributions import AbstractDistribution, Value
 from passiflex.campaigns.target import Target
-from passiflex.simulation.scenario import Scenario
+from passiflex.scenarios.scenario import Scenario
 from passiflex.texts.model_mistakes import explained
 from passiflex.texts.yaml_tree import Place, dotted
 

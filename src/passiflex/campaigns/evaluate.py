@@ -29,10 +29,10 @@ from passiflex.passivity.ledger import Signals
 from passiflex.pieces.engines import usable_cores
 from passiflex.pieces.manifest import load_manifest
 from passiflex.pieces.source import source_digest
+from passiflex.problems.problem import Problem
 from passiflex.responses.steps import displacement, step_window
 from passiflex.simulation import Run, Scenario, resolve, simulate_problem
 from passiflex.simulation.batch import digest_batch, simulate_in_lane
-from passiflex.simulation.problem import Problem
 
 REFUSED = "refused"
 """Verdict of a sample that is no possible robot or scenario: it was not run, and `failure` says why."""

@@ -14,10 +14,10 @@ from passiflex.campaigns.measures import MEASURES
 from passiflex.campaigns.samples import Values
 from passiflex.errors import UnstableLoopError
 from passiflex.files import OutputError, read_json, read_regular, require_writable, whole_file
-from passiflex.simulation.admissible import require_stable
-from passiflex.simulation.problem import Problem
-from passiflex.simulation.run import package_version, source_commit
-from passiflex.simulation.scenario import Scenario
+from passiflex.origin import package_version, source_commit
+from passiflex.problems.problem import Problem
+from passiflex.scenarios.scenario import Scenario
+from passiflex.stability.admissible import require_stable
 
 NAME = "search.json"
 MOST_BYTES = 100_000_000

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from passiflex.passivity import audit
 from passiflex.passivity.ledger import Signals
+from passiflex.problems.gains import target_inertia
+from passiflex.problems.problem import Problem
 from passiflex.responses.closed_form import ideal_displacement
 from passiflex.responses.metrics import rms
 from passiflex.responses.steps import StepWindow, displacement, step_numbers
-from passiflex.simulation.gains import target_inertia
-from passiflex.simulation.problem import Problem
 
 Array = NDArray[np.float64]
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from passiflex.campaigns.campaign import Campaign
 from passiflex.campaigns.ends import at_medians, trials
 from passiflex.errors import PassiflexError, ScenarioError
+from passiflex.problems.resolution import resolve
 from passiflex.robots.flexible import FlexibleJointRobot
-from passiflex.simulation.resolution import resolve
-from passiflex.simulation.scenario import Scenario
+from passiflex.scenarios.scenario import Scenario
 from passiflex.texts.yaml_tree import dotted
 
 

@@ -34,8 +34,8 @@ from passiflex.pieces.run_pieces import Progress, run_pieces
 from passiflex.pieces.store import Store, open_store
 from passiflex.pieces.stored_rows import read_blocks, read_rows
 from passiflex.simulation import Run, resolve
-from passiflex.simulation.admissible import require_stable
 from passiflex.simulation.batch import lane_loop
+from passiflex.stability.admissible import require_stable
 from passiflex.texts.yaml_tree import read_back
 
 RUNS = "runs"

@@ -14,7 +14,7 @@ from passiflex.campaigns.distributions import Value
 from passiflex.campaigns.draws import columns, draws, scenario_seed
 from passiflex.campaigns.target import PathRefusedError, Target, complete_data, locate
 from passiflex.errors import ScenarioError, SizeError
-from passiflex.simulation.scenario import Scenario
+from passiflex.scenarios.scenario import Scenario
 from passiflex.texts.model_mistakes import told
 
 Values = dict[str, Value | tuple[Value, ...]]

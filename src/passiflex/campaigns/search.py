@@ -16,9 +16,9 @@ from passiflex.campaigns.found import Best, Case, Found, case_scenario
 from passiflex.campaigns.measures import MEASURES
 from passiflex.campaigns.samples import values_of_row, with_values
 from passiflex.errors import NameUnknownError, PassiflexError, ValueRangeError
-from passiflex.simulation.problem import Problem
-from passiflex.simulation.resolution import resolve
-from passiflex.simulation.scenario import Scenario
+from passiflex.problems.problem import Problem
+from passiflex.problems.resolution import resolve
+from passiflex.scenarios.scenario import Scenario
 
 Array = NDArray[np.float64]
 Report = Callable[[str], None]

@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 from pydantic.fields import FieldInfo
 
-from passiflex.simulation.scenario import Scenario
+from passiflex.scenarios.scenario import Scenario
 from passiflex.texts.model_mistakes import Model, fields, models, suggested, tag_field
 from passiflex.texts.quantity import Quantity
 

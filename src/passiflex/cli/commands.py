@@ -91,9 +91,9 @@ def audit(run: Path, /) -> int:
     from rich.table import Table
 
     from passiflex.passivity import audit as audit_run
-    from passiflex.simulation.passed_limit import passed_limits
-    from passiflex.simulation.run import Run
-    from passiflex.simulation.run_file import remarks
+    from passiflex.runs.passed_limit import passed_limits
+    from passiflex.runs.run import Run
+    from passiflex.runs.run_file import remarks
 
     read = Run.load(run)
     for remark in remarks(read.data):
@@ -141,7 +141,7 @@ def robots() -> int:
 
 def _wrong_books(run: Run, result: Audit) -> str:
     """Return by how much the books of the law are wrong, and what they do not know."""
-    from passiflex.simulation.unbooked import NOTHING
+    from passiflex.problems.unbooked import NOTHING
 
     if run.sampled and run.has_tank:
         return f"the tank claims up to {result.books_error:.3g} J beyond what is there"

@@ -103,7 +103,7 @@ def recommend(
     from passiflex import limits as room
     from passiflex.limits.subject import number
     from passiflex.robots.flexible import FlexibleJointRobot
-    from passiflex.simulation.scenario_file import is_scenario
+    from passiflex.scenarios.scenario_file import is_scenario
     from passiflex.texts.quantity import Quantity
 
     with timed():

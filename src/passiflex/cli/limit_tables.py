@@ -9,8 +9,8 @@ from rich.table import Table
 
 from passiflex.limits import Confirmation, LimitMap
 from passiflex.limits.planes import within
-from passiflex.simulation.admissible import INERTIA_RATIOS
-from passiflex.simulation.clock_words import delay_words, hertz
+from passiflex.stability.admissible import INERTIA_RATIOS
+from passiflex.stability.clock_words import delay_words, hertz
 
 SHOWN = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0)
 """K_e/K of the table."""

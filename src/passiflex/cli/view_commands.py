@@ -11,7 +11,7 @@ import cyclopts
 from passiflex.cli.terminal import console, timed
 
 if TYPE_CHECKING:
-    from passiflex.simulation.salvaged import Salvaged
+    from passiflex.runs.salvaged import Salvaged
 
 Compared = Annotated[
     tuple[Path, ...],
@@ -104,7 +104,7 @@ def export(
 
 def _read(*paths: Path) -> list[Salvaged]:
     """Return what can be read of each file, after a line on everything that is wrong with it."""
-    from passiflex.simulation.salvaged import salvage
+    from passiflex.runs.salvaged import salvage
 
     read = [salvage(path) for path in paths]
     for path, (_, notices) in zip(paths, read, strict=True):
@@ -116,7 +116,7 @@ def _read(*paths: Path) -> list[Salvaged]:
 def _target(out: Path | None, usual: str, endings: tuple[str, ...], run: Path, *others: Path) -> Path:
     """Return the file to write, by default the run's name with the `usual` end: refused before the work, not after."""
     from passiflex.files import OutputError, require_writable
-    from passiflex.simulation.run_file import require_file
+    from passiflex.runs.run_file import require_file
 
     require_file(run)
     if out is None:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from passiflex.exports.signals import signals_of
-from passiflex.simulation.run import Run
+from passiflex.runs.run import Run
 
 FORMULA = ("=", "+", "-", "@", "\t", "\r")
 """What a spreadsheet would take for the beginning of a formula."""

@@ -10,7 +10,7 @@ from passiflex.exports.csv_file import write_csv
 from passiflex.exports.mcap_file import write_mcap
 from passiflex.exports.rrd_file import write_rrd
 from passiflex.files import whole_file
-from passiflex.simulation.run import Run
+from passiflex.runs.run import Run
 
 FORMATS: dict[str, Callable[[Run, Path], None]] = {
     ".csv": write_csv,

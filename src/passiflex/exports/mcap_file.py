@@ -12,8 +12,8 @@ from passiflex.exports.ros2_definitions import definition_of
 from passiflex.exports.ros2_topics import topics_of
 from passiflex.exports.signals import signals_of
 from passiflex.robots.solids import with_solids
-from passiflex.simulation.run import Run
-from passiflex.simulation.run_arm import chain_of
+from passiflex.runs.run import Run
+from passiflex.runs.run_arm import chain_of
 
 
 def write_mcap(run: Run, path: Path) -> None:

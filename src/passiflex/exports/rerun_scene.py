@@ -13,8 +13,8 @@ from passiflex.robots.bodies import Array
 from passiflex.robots.chain import SerialChain
 from passiflex.robots.frames import relative_frames
 from passiflex.robots.solids import COLOURS, Solid, solids, with_solids
-from passiflex.simulation.run import Run
-from passiflex.simulation.run_arm import chain_of
+from passiflex.runs.run import Run
+from passiflex.runs.run_arm import chain_of
 from passiflex.views.viewed import first_finite
 
 LONGEST_ARROW = 0.25

@@ -14,7 +14,7 @@ from passiflex.exports.rerun_scene import log_scene
 from passiflex.exports.rerun_stream import GREY, PALETTE, TIMELINE, Stream
 from passiflex.exports.signals import signals_of
 from passiflex.passivity import audit_if_possible
-from passiflex.simulation.run import Run
+from passiflex.runs.run import Run
 from passiflex.views import KINDS, Panel, Viewed, ideal_motion, marks_of, panels, spans_of
 
 OPENED = {"energy": "energies", "port": "powers", "tracking": "z", "torque": "all joints"}

@@ -10,8 +10,8 @@ import numpy as np
 import xarray as xr
 
 from passiflex.robots.bodies import Array
-from passiflex.simulation.run import Run
-from passiflex.simulation.run_arm import chain_of
+from passiflex.runs.run import Run
+from passiflex.runs.run_arm import chain_of
 
 
 class Signal(NamedTuple):

@@ -7,4 +7,4 @@ from passiflex.limits.limit_map import limit_map as limit_map
 from passiflex.limits.recommend import recommend as recommend
 from passiflex.limits.recommend_for import recommend_for as recommend_for
 from passiflex.limits.recommendation import Recommendation as Recommendation
-from passiflex.simulation.admissible import Admissible as Admissible
+from passiflex.stability.admissible import Admissible as Admissible

@@ -13,10 +13,10 @@ from passiflex.limits.confirmation import settled
 from passiflex.limits.inertia_search import InertiaSearch, UnattainableError
 from passiflex.limits.margin_box import MarginBox
 from passiflex.limits.recommendation import Recommendation
+from passiflex.problems.altered import rewritten
 from passiflex.robots.flexible import FlexibleJointRobot
 from passiflex.simulation import parse_scenario, resolve
-from passiflex.simulation.altered import rewritten
-from passiflex.simulation.judgement import judge
+from passiflex.stability.judgement import judge
 from passiflex.texts.yaml_tree import read_back
 
 Array = NDArray[np.float64]

@@ -9,10 +9,10 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
-from passiflex.simulation.linear_loop import LinearLoop
-from passiflex.simulation.loop_at_rest import standing
-from passiflex.simulation.modes import self_motion, trembles
-from passiflex.simulation.timing import Timing
+from passiflex.stability.linear_loop import LinearLoop
+from passiflex.stability.loop_at_rest import standing
+from passiflex.stability.modes import self_motion, trembles
+from passiflex.stability.timing import Timing
 
 if TYPE_CHECKING:
     from passiflex.limits.margin_box import MarginBox, Member

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from passiflex.limits.subject import Subject, sampled_problem
-from passiflex.simulation.admissible import Admissible
-from passiflex.simulation.admissible import check as check_problem
+from passiflex.stability.admissible import Admissible
+from passiflex.stability.admissible import check as check_problem
 
 
 def check(

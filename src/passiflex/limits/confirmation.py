@@ -14,15 +14,15 @@ from numpy.typing import NDArray
 from passiflex.control.tank import NO_CAP
 from passiflex.errors import ValueRangeError
 from passiflex.layout import Layout
+from passiflex.loops.motion import hold
+from passiflex.loops.sampled_loop import Parts, SampledLoop
+from passiflex.problems.altered import altered, replaced
+from passiflex.problems.problem import Event, Noise
 from passiflex.simulation import Problem
-from passiflex.simulation.altered import altered, replaced
-from passiflex.simulation.law_slope import IDEAL
-from passiflex.simulation.linear_loop import LinearLoop
-from passiflex.simulation.loop_at_rest import BRIMFUL
-from passiflex.simulation.motion import hold
-from passiflex.simulation.problem import Event, Noise
-from passiflex.simulation.sampled_loop import Parts, SampledLoop
 from passiflex.simulation.simulate_sampled import simulate_unchecked
+from passiflex.stability.law_slope import IDEAL
+from passiflex.stability.linear_loop import LinearLoop
+from passiflex.stability.loop_at_rest import BRIMFUL
 
 Array = NDArray[np.float64]
 

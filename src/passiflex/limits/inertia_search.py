@@ -12,7 +12,7 @@ from passiflex.errors import ValueRangeError
 from passiflex.limits.margin_box import MarginBox, Member, Worst
 from passiflex.limits.torque_noise import torque_by_noise
 from passiflex.robots.flexible import FlexibleJointRobot
-from passiflex.simulation.modes import lasting, trembles
+from passiflex.stability.modes import lasting, trembles
 
 Array = NDArray[np.float64]
 

@@ -26,10 +26,10 @@ from passiflex.limits.planes import (
 )
 from passiflex.limits.points import points_to_confirm
 from passiflex.limits.subject import Subject, sampled_problem
+from passiflex.problems.altered import altered
 from passiflex.simulation import Problem
-from passiflex.simulation.admissible import Admissible, check
-from passiflex.simulation.altered import altered
-from passiflex.simulation.linear_loop import LinearLoop
+from passiflex.stability.admissible import Admissible, check
+from passiflex.stability.linear_loop import LinearLoop
 
 Array = NDArray[np.float64]
 Report = Callable[[str], None]

@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 
 from passiflex.errors import ValueRangeError
 from passiflex.limits.box_slopes import steepest
+from passiflex.problems.resolution import SCALED
 from passiflex.simulation import Problem
-from passiflex.simulation.linear_loop import LinearLoop
-from passiflex.simulation.loop_at_rest import standing
-from passiflex.simulation.resolution import SCALED
+from passiflex.stability.linear_loop import LinearLoop
+from passiflex.stability.loop_at_rest import standing
 
 Array = NDArray[np.float64]
 Gains = Mapping[str, Array]

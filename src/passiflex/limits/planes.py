@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from passiflex.simulation.admissible import INERTIA_RATIOS, first_stable, least_inertia, shaping
-from passiflex.simulation.linear_loop import LinearLoop
+from passiflex.stability.admissible import INERTIA_RATIOS, first_stable, least_inertia, shaping
+from passiflex.stability.linear_loop import LinearLoop
 
 Array = NDArray[np.float64]
 

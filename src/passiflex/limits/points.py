@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from passiflex.limits.confirmation import VISIBLE
 from passiflex.limits.planes import scaled_impedance, within
-from passiflex.simulation.admissible import RATES, shaping
-from passiflex.simulation.linear_loop import LinearLoop
+from passiflex.stability.admissible import RATES, shaping
+from passiflex.stability.linear_loop import LinearLoop
 
 if TYPE_CHECKING:
     from passiflex.limits.limit_map import LimitMap

@@ -10,7 +10,7 @@ from passiflex.limits.recommend import Report, recommend_gains
 from passiflex.limits.recommendation import Recommendation
 from passiflex.limits.subject import Subject, sampled_problem
 from passiflex.limits.workspace import workspace_postures
-from passiflex.simulation.altered import rewritten
+from passiflex.problems.altered import rewritten
 
 TORQUE_NOISE = 0.2
 """Variance [(N m)²] where the scenario has no noise: that of the paper's Fig. 3."""

@@ -11,7 +11,7 @@ import yaml
 from numpy.typing import NDArray
 
 from passiflex.limits.margin_box import NEAR, Worst
-from passiflex.simulation.clock_words import delay_words, hertz
+from passiflex.stability.clock_words import delay_words, hertz
 
 Array = NDArray[np.float64]
 

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from passiflex.errors import ValueRangeError
+from passiflex.problems.altered import HIGHEST_RATE, altered, at_rate
+from passiflex.scenarios.scenario_file import as_scenario
 from passiflex.simulation import Problem, Scenario, parse_scenario, resolve
-from passiflex.simulation.altered import HIGHEST_RATE, altered, at_rate
-from passiflex.simulation.scenario_file import as_scenario
 from passiflex.texts.quantity import Quantity, shown
 
 Subject = Problem | Scenario | Mapping[str, Any] | str | Path

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from passiflex.simulation.law_slope import Gains
-from passiflex.simulation.linear_loop import DrivenLoop, LinearLoop
-from passiflex.simulation.missed import stationary
-from passiflex.simulation.modes import coupled, drift_of, projector
+from passiflex.stability.law_slope import Gains
+from passiflex.stability.linear_loop import DrivenLoop, LinearLoop
+from passiflex.stability.missed import stationary
+from passiflex.stability.modes import coupled, drift_of, projector
 
 Array = NDArray[np.float64]
 Values = NDArray[Any]

@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from passiflex.control.task import AbstractTask
 from passiflex.errors import ValueRangeError
+from passiflex.problems.posture import held_jacobian, posture
 from passiflex.robots.flexible import FlexibleJointRobot
-from passiflex.simulation.posture import held_jacobian, posture
 
 Array = NDArray[np.float64]
 

@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 
 from passiflex.errors import ArgumentError
+from passiflex.loops.witness import TERMS
 from passiflex.passivity.extremes import Extremes, available_energy, extremes
 from passiflex.passivity.ledger import (
     Balance,
@@ -17,8 +18,7 @@ from passiflex.passivity.ledger import (
     motor_side_storage,
     robot_balance,
 )
-from passiflex.simulation.unbooked import SHAPED, listed
-from passiflex.simulation.witness import TERMS
+from passiflex.problems.unbooked import SHAPED, listed
 
 Verdict = Literal["passive", "violated", "inconclusive"]
 

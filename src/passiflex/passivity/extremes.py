@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from passiflex.loops.witness import ROUND_OFF, TERMS
 from passiflex.passivity.ledger import (
     Signals,
     claimed_balance,
@@ -17,7 +18,6 @@ from passiflex.passivity.ledger import (
     overclaimed,
     port_energy,
 )
-from passiflex.simulation.witness import ROUND_OFF, TERMS
 
 ROUNDING = 1e-9
 """Share of a margin (or of 1 J) by which rows and steps may differ: both are sums of the same numbers."""

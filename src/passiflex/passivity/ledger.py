@@ -12,7 +12,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from passiflex.simulation.sampled_loop import AT_ONCE
+from passiflex.loops.sampled_loop import AT_ONCE
 
 Array = NDArray[np.float64]
 

@@ -13,6 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from passiflex.errors import PassiflexError
 from passiflex.files import read_json, read_regular, whole_file
+from passiflex.origin import package_version, source_commit
 from passiflex.pieces.source import source_digest
 
 FORMAT = "passiflex campaign 1"
@@ -100,8 +101,6 @@ class Manifest(BaseModel):
 
 def new_manifest(campaign: str, identity: str, samples: int, piece: int) -> Manifest:
     """Return the manifest of a campaign that starts now."""
-    from passiflex.simulation.run import package_version, source_commit  # seconds to import: only at a start
-
     now = datetime.now(UTC).isoformat(timespec="seconds")
     return Manifest(
         campaign=campaign,

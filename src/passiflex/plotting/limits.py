@@ -13,8 +13,8 @@ from passiflex.limits.confirmation import Confirmation
 from passiflex.limits.limit_map import LimitMap
 from passiflex.limits.planes import Plane
 from passiflex.plotting.style import JOINTS, axis_label, figure_style
-from passiflex.simulation.admissible import INERTIA_RATIOS
-from passiflex.simulation.clock_words import delay_words
+from passiflex.stability.admissible import INERTIA_RATIOS
+from passiflex.stability.clock_words import delay_words
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist

@@ -8,8 +8,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 import yaml
 
-from passiflex.simulation import Run, Scenario, passed_limits
-from passiflex.simulation.law_settings import (
+from passiflex.scenarios.law_settings import (
     Damping,
     ImpedanceSettings,
     ShapedInertia,
@@ -17,6 +16,7 @@ from passiflex.simulation.law_settings import (
     Stiffness,
     TargetInertia,
 )
+from passiflex.simulation import Run, Scenario, passed_limits
 from passiflex.texts.yaml_tree import RefusedText, Tree
 
 Facts = list[tuple[str, str]]

@@ -12,8 +12,8 @@ from passiflex.reports.arm import same_kinematics
 from passiflex.reports.arrays import Arrays
 from passiflex.reports.thinning import frame_rows
 from passiflex.robots import SerialChain
+from passiflex.runs.run_arm import chain_of
 from passiflex.simulation import Run
-from passiflex.simulation.run_arm import chain_of
 from passiflex.views import Viewed
 from passiflex.views.viewed import first_finite
 

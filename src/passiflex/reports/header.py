@@ -13,8 +13,8 @@ from passiflex.reports.diagrams import Diagrams, marks_header, spans_header
 from passiflex.reports.facts import facts, made_by, shown_configuration
 from passiflex.reports.frames import frames_header, ghosts_header
 from passiflex.reports.metrics import metrics_header, verdict_header
+from passiflex.runs.run_arm import chain_of
 from passiflex.simulation import Run
-from passiflex.simulation.run_arm import chain_of
 from passiflex.views import KINDS, Viewed, marks_of, panels, roles_of, spans_of, viewed
 from passiflex.views.events import scenario_of
 

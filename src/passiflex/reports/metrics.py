@@ -8,11 +8,11 @@ from typing import Any
 
 from passiflex.campaigns.measures import MEASURES, measures
 from passiflex.errors import PassiflexError
+from passiflex.loops.witness import ROUND_OFF
 from passiflex.passivity import Audit, audit_if_possible
 from passiflex.responses.steps import step_window
+from passiflex.runs.run_arm import problem_of
 from passiflex.simulation import Run
-from passiflex.simulation.run_arm import problem_of
-from passiflex.simulation.witness import ROUND_OFF
 from passiflex.views.events import scenario_of
 
 WORDS = {

@@ -8,8 +8,8 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
-from passiflex.simulation.motion import DEGREE, Motion, pose_at
-from passiflex.simulation.problem import Event
+from passiflex.loops.motion import DEGREE, Motion, pose_at
+from passiflex.problems.problem import Event
 
 Array = NDArray[np.float64]
 

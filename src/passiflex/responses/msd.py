@@ -9,8 +9,8 @@ import numpy as np
 import scipy.integrate
 from numpy.typing import NDArray
 
-from passiflex.simulation.motion import Motion, pose_at
-from passiflex.simulation.problem import Event
+from passiflex.loops.motion import Motion, pose_at
+from passiflex.problems.problem import Event
 
 Array = NDArray[np.float64]
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from passiflex.responses.metrics import overshoot, rms, settling_time
-from passiflex.simulation.scenario import Scenario, Step
+from passiflex.scenarios.scenario import Scenario, Step
 
 Array = NDArray[np.float64]
 

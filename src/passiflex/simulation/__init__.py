@@ -9,33 +9,33 @@ from typing import TYPE_CHECKING, Any
 from passiflex.lazy import lazy_names as _lazy_names
 
 if TYPE_CHECKING:
-    from passiflex.simulation.closed_loop import ClosedLoop as ClosedLoop
-    from passiflex.simulation.compiled import CompiledLoop as CompiledLoop
-    from passiflex.simulation.compiled import compiled_loop as compiled_loop
-    from passiflex.simulation.passed_limit import PassedLimit as PassedLimit
-    from passiflex.simulation.passed_limit import passed_limits as passed_limits
-    from passiflex.simulation.problem import Problem as Problem
-    from passiflex.simulation.resolution import resolve as resolve
-    from passiflex.simulation.run import Run as Run
-    from passiflex.simulation.salvaged import salvage as salvage
-    from passiflex.simulation.scenario import Scenario as Scenario
-    from passiflex.simulation.scenario_file import load_scenario as load_scenario
-    from passiflex.simulation.scenario_file import parse_scenario as parse_scenario
+    from passiflex.loops.closed_loop import ClosedLoop as ClosedLoop
+    from passiflex.loops.compiled import CompiledLoop as CompiledLoop
+    from passiflex.loops.compiled import compiled_loop as compiled_loop
+    from passiflex.problems.problem import Problem as Problem
+    from passiflex.problems.resolution import resolve as resolve
+    from passiflex.runs.passed_limit import PassedLimit as PassedLimit
+    from passiflex.runs.passed_limit import passed_limits as passed_limits
+    from passiflex.runs.run import Run as Run
+    from passiflex.runs.salvaged import salvage as salvage
+    from passiflex.scenarios.scenario import Scenario as Scenario
+    from passiflex.scenarios.scenario_file import load_scenario as load_scenario
+    from passiflex.scenarios.scenario_file import parse_scenario as parse_scenario
     from passiflex.simulation.through_time import simulate_problem as simulate_problem
 
 _HOMES = {
-    "ClosedLoop": "closed_loop",
-    "CompiledLoop": "compiled",
-    "PassedLimit": "passed_limit",
-    "Problem": "problem",
-    "Run": "run",
-    "Scenario": "scenario",
-    "compiled_loop": "compiled",
-    "load_scenario": "scenario_file",
-    "parse_scenario": "scenario_file",
-    "passed_limits": "passed_limit",
-    "resolve": "resolution",
-    "salvage": "salvaged",
+    "ClosedLoop": ".loops.closed_loop",
+    "CompiledLoop": ".loops.compiled",
+    "PassedLimit": ".runs.passed_limit",
+    "Problem": ".problems.problem",
+    "Run": ".runs.run",
+    "Scenario": ".scenarios.scenario",
+    "compiled_loop": ".loops.compiled",
+    "load_scenario": ".scenarios.scenario_file",
+    "parse_scenario": ".scenarios.scenario_file",
+    "passed_limits": ".runs.passed_limit",
+    "resolve": ".problems.resolution",
+    "salvage": ".runs.salvaged",
     "simulate_problem": "through_time",
 }
 
@@ -52,8 +52,8 @@ def simulate(scenario: Scenario | Mapping[str, Any] | str | Path) -> Run:
     PassiflexError
         If the scenario has mistakes or does not fit its robot.
     """
-    from passiflex.simulation.resolution import resolve
-    from passiflex.simulation.scenario_file import as_scenario
+    from passiflex.problems.resolution import resolve
+    from passiflex.scenarios.scenario_file import as_scenario
     from passiflex.simulation.through_time import simulate_problem
 
     return simulate_problem(resolve(as_scenario(scenario)))

@@ -12,14 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from passiflex.errors import NameUnknownError, SimulationError
+from passiflex.loops.compiled import CompiledSampledLoop, compiled_sampled_loop, structure
+from passiflex.loops.recorded import reported, sample_parts
+from passiflex.loops.sampled_loop import SampledLoop
+from passiflex.loops.witness import Noted
 from passiflex.native import Change, LaneFunctions, LaneInputs, LaneLoop, find_compiler
-from passiflex.simulation.compiled import CompiledSampledLoop, compiled_sampled_loop, structure
-from passiflex.simulation.noise_credit import charged
-from passiflex.simulation.problem import Problem
-from passiflex.simulation.recorded import reported, sample_parts
+from passiflex.problems.problem import Problem
+from passiflex.problems.unbooked import unbooked
+from passiflex.runs.run import Rows, Run, assemble
 from passiflex.simulation.rows import Chance, Told, orders
-from passiflex.simulation.run import Rows, Run, assemble
-from passiflex.simulation.sampled_loop import SampledLoop
 from passiflex.simulation.simulate_sampled import (
     left_finite,
     longest_step,
@@ -27,8 +28,7 @@ from passiflex.simulation.simulate_sampled import (
     simulate_unchecked,
     start,
 )
-from passiflex.simulation.unbooked import unbooked
-from passiflex.simulation.witness import Noted
+from passiflex.stability.noise_credit import charged
 
 Array = NDArray[np.float64]
 T = TypeVar("T")

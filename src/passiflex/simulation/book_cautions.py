@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from passiflex.control.law import ImpedanceLaw
-from passiflex.simulation.altered import altered, replaced
-from passiflex.simulation.linear_loop import LinearLoop
-from passiflex.simulation.noise_credit import POSTURES, REACH, noise_credit
-from passiflex.simulation.problem import Problem
-from passiflex.simulation.sampled_loop import SampledLoop
+from passiflex.loops.sampled_loop import SampledLoop
+from passiflex.problems.altered import altered, replaced
+from passiflex.problems.problem import Problem
+from passiflex.stability.linear_loop import LinearLoop
+from passiflex.stability.noise_credit import POSTURES, REACH, noise_credit
 
 Array = NDArray[np.float64]
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from passiflex.problems.problem import Problem
 from passiflex.simulation.book_cautions import book_cautions
-from passiflex.simulation.problem import Problem
 from passiflex.simulation.stability_cautions import stability_cautions
 from passiflex.simulation.turn_cautions import far_turns, large_moments
 

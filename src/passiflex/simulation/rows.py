@@ -8,10 +8,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from passiflex.loops.motion import Motion
+from passiflex.loops.period_row import PeriodRow
 from passiflex.native import NativeFunction
-from passiflex.simulation.motion import Motion
-from passiflex.simulation.period_row import PeriodRow
-from passiflex.simulation.problem import Event, Problem
+from passiflex.problems.problem import Event, Problem
 
 Array = NDArray[np.float64]
 

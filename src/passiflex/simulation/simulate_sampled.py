@@ -8,18 +8,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from passiflex.errors import SimulationError
+from passiflex.loops.compiled import CompiledSampledLoop, compiled_sampled_loop
+from passiflex.loops.plant import SURROUNDINGS
+from passiflex.loops.recorded import reported, sample_parts
+from passiflex.loops.witness import Noted
 from passiflex.native import LoopState, NativeFunction, fastest_pole
 from passiflex.native.stability import STABILITY_LIMIT
-from passiflex.simulation.admissible import require_stable
-from passiflex.simulation.compiled import CompiledSampledLoop, compiled_sampled_loop
-from passiflex.simulation.noise_credit import charged
-from passiflex.simulation.plant import SURROUNDINGS
-from passiflex.simulation.problem import Problem
-from passiflex.simulation.recorded import reported, sample_parts
+from passiflex.problems.problem import Problem
+from passiflex.runs.run import Rows, Run, assemble
 from passiflex.simulation.rows import NOW
 from passiflex.simulation.rows import Rows as PeriodRows
-from passiflex.simulation.run import Rows, Run, assemble
-from passiflex.simulation.witness import Noted
+from passiflex.stability.admissible import require_stable
+from passiflex.stability.noise_credit import charged
 
 Array = NDArray[np.float64]
 

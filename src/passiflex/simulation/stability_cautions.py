@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from passiflex.simulation.admissible import SEEN, drift_words
-from passiflex.simulation.linear_loop import LinearLoop
-from passiflex.simulation.problem import Problem
+from passiflex.problems.problem import Problem
+from passiflex.stability.admissible import SEEN, drift_words
+from passiflex.stability.linear_loop import LinearLoop
 
 
 def stability_cautions(problem: Problem) -> tuple[str, ...]:

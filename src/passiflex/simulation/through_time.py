@@ -9,10 +9,13 @@ from numpy.typing import NDArray
 
 from passiflex.control.tank import jump_cost
 from passiflex.errors import SimulationError
+from passiflex.loops.closed_loop import ENERGIES
+from passiflex.loops.compiled import CompiledLoop, compiled_loop
+from passiflex.loops.motion import MOTION, Motion, Pose, between, hold, pose_at, shifted
 from passiflex.native import Watched, fastest_pole
 from passiflex.native.stability import STABILITY_LIMIT
-from passiflex.simulation.closed_loop import ENERGIES
-from passiflex.simulation.compiled import CompiledLoop, compiled_loop
+from passiflex.problems.problem import Event, Problem
+from passiflex.runs.run import Rows, Run, assemble
 from passiflex.simulation.integrate import (
     CHECK,
     RESOLVED,
@@ -26,9 +29,6 @@ from passiflex.simulation.integrate import (
     share_for,
     smooth_stretch,
 )
-from passiflex.simulation.motion import MOTION, Motion, Pose, between, hold, pose_at, shifted
-from passiflex.simulation.problem import Event, Problem
-from passiflex.simulation.run import Rows, Run, assemble
 from passiflex.simulation.simulate_sampled import simulate_sampled
 
 Array = NDArray[np.float64]

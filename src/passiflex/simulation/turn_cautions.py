@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from passiflex.control.task import PoseTask
 from passiflex.control.turning import held_angle, largest_moment, turning_moment
-from passiflex.simulation.motion import Motion, Pose, between, hold, pose_at
-from passiflex.simulation.problem import Problem
+from passiflex.loops.motion import Motion, Pose, between, hold, pose_at
+from passiflex.problems.problem import Problem
 
 Array = NDArray[np.float64]
 

@@ -9,10 +9,10 @@ import numpy as np
 from passiflex.passivity import audit
 from passiflex.responses.metrics import rms
 from passiflex.responses.steps import displacement
+from passiflex.scenarios.control_settings import Control, SensorSettings
+from passiflex.scenarios.law_settings import ImpedanceSettings, ShapedInertia, ShapedStiffness
+from passiflex.scenarios.scenario import Force
 from passiflex.simulation import Run, Scenario, resolve, simulate_problem
-from passiflex.simulation.control_settings import Control, SensorSettings
-from passiflex.simulation.law_settings import ImpedanceSettings, ShapedInertia, ShapedStiffness
-from passiflex.simulation.scenario import Force
 from passiflex.studies.paper import Report, shipped_scenario
 from passiflex.studies.summary import plain
 

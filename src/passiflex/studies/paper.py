@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from passiflex.control.law import ImpedanceLaw
 from passiflex.errors import NameUnknownError
+from passiflex.problems.gains import target_inertia
+from passiflex.problems.posture import natural_inertia
 from passiflex.responses.msd import IdealResponse, ideal_response
+from passiflex.scenarios.law_settings import ImpedanceSettings, RigidSettings, TargetInertia
 from passiflex.simulation import Problem, Run, Scenario, parse_scenario, resolve, simulate_problem
-from passiflex.simulation.gains import target_inertia
-from passiflex.simulation.law_settings import ImpedanceSettings, RigidSettings, TargetInertia
-from passiflex.simulation.posture import natural_inertia
 
 FIGURES = ("fig1", "fig2", "fig3")
 TARGET_RATIO = 0.7

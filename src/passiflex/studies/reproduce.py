@@ -13,16 +13,16 @@ from numpy.typing import NDArray
 
 from passiflex.errors import NameUnknownError
 from passiflex.files import require_writable, whole_file
+from passiflex.origin import package_version, source_commit
 from passiflex.passivity import claimed_balance
 from passiflex.plotting.figures import CircleColumn, Curve, StepColumn, draw_circle, draw_steps, save_figure
 from passiflex.reports import write_report
 from passiflex.reports.viewer import read_viewer
 from passiflex.responses.steps import displacement
 from passiflex.robots import FlexibleJointRobot
+from passiflex.scenarios.law_settings import ImpedanceSettings
+from passiflex.scenarios.scenario import Circle, Step
 from passiflex.simulation import Scenario
-from passiflex.simulation.law_settings import ImpedanceSettings
-from passiflex.simulation.run import package_version, source_commit
-from passiflex.simulation.scenario import Circle, Step
 from passiflex.studies.paper import FIGURES, Case, Report, figure_cases
 from passiflex.studies.sampled import reproduce_sampled
 from passiflex.studies.summary import summarise

@@ -19,11 +19,11 @@ from passiflex.reports import write_report
 from passiflex.responses.metrics import rms
 from passiflex.responses.msd import IdealResponse
 from passiflex.responses.steps import displacement, step_window
+from passiflex.scenarios.control_settings import Drag, MotorSettings
+from passiflex.scenarios.law_settings import ImpedanceSettings
+from passiflex.scenarios.scenario import Circle
+from passiflex.scenarios.tank_settings import TankSettings
 from passiflex.simulation import Problem, Run, Scenario, resolve, simulate_problem
-from passiflex.simulation.control_settings import Drag, MotorSettings
-from passiflex.simulation.law_settings import ImpedanceSettings
-from passiflex.simulation.scenario import Circle
-from passiflex.simulation.tank_settings import TankSettings
 from passiflex.studies.external_torque import external_torque_table
 from passiflex.studies.paper import Report, ideals, shipped_scenario
 from passiflex.studies.summary import SETTLED_CIRCLE, plain, response_numbers

@@ -19,8 +19,8 @@ from passiflex.responses.metrics import largest_rise
 from passiflex.responses.msd import ideal_response
 from passiflex.responses.steps import displacement, step_numbers, step_window
 from passiflex.robots import FlexibleJointRobot
+from passiflex.scenarios.scenario import Circle
 from passiflex.simulation import Scenario, resolve, simulate_problem
-from passiflex.simulation.scenario import Circle
 from passiflex.studies.paper import TARGET_RATIO, Report, shipped_scenario, with_baseline
 
 POSTURES = {
@@ -104,7 +104,7 @@ def _collect(
 
 
 def _step_point(v: Variant) -> dict[str, float]:
-    from passiflex.simulation.gains import target_inertia
+    from passiflex.problems.gains import target_inertia
 
     problem = resolve(v.scenario, v.robot)
     proposed = simulate_problem(problem)

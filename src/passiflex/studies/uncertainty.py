@@ -21,9 +21,9 @@ from passiflex.plotting.figures import Curve, save_figure
 from passiflex.plotting.uncertainty import UncertainColumn, draw_uncertainty
 from passiflex.reports import write_report
 from passiflex.responses.steps import step_window
+from passiflex.scenarios.control_settings import Control
+from passiflex.scenarios.model_errors import ModelErrors
 from passiflex.simulation import Scenario
-from passiflex.simulation.control_settings import Control
-from passiflex.simulation.model_errors import ModelErrors
 from passiflex.studies.paper import Report, shipped_scenario, with_baseline, without_noise
 from passiflex.studies.sampled import VARIANTS
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from passiflex.passivity import available_energy, port_tank
 from passiflex.passivity.ledger import motor_side_storage
-from passiflex.simulation.run import Run
+from passiflex.runs.run import Run
 from passiflex.views.events import marks_of, scenario_of, spans_of
 from passiflex.views.panel import Array, Curve, Level, Panel
 from passiflex.views.viewed import Viewed, curve, curves, other_role, with_curves

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from passiflex.errors import ScenarioError
-from passiflex.simulation.run import Run
-from passiflex.simulation.scenario import Circle, Force, Hold, Move, Scenario, Step
-from passiflex.simulation.scenario_file import parse_scenario
+from passiflex.runs.run import Run
+from passiflex.scenarios.scenario import Circle, Force, Hold, Move, Scenario, Step
+from passiflex.scenarios.scenario_file import parse_scenario
 from passiflex.views.panel import Array, Mark, Span
 
 GOVERNED = ("reference", "stiffness")

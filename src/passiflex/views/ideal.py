@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from passiflex.errors import PassiflexError
+from passiflex.loops.motion import Pose
+from passiflex.problems.gains import target_inertia
+from passiflex.problems.timeline import timeline
 from passiflex.responses.closed_form import ideal_displacement
-from passiflex.simulation.gains import target_inertia
-from passiflex.simulation.motion import Pose
-from passiflex.simulation.run import Run
-from passiflex.simulation.run_arm import problem_of
-from passiflex.simulation.scenario import Scenario
-from passiflex.simulation.timeline import timeline
+from passiflex.runs.run import Run
+from passiflex.runs.run_arm import problem_of
+from passiflex.scenarios.scenario import Scenario
 from passiflex.views.events import scenario_of
 from passiflex.views.panel import Array
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
-from passiflex.simulation.run import Run
+from passiflex.runs.run import Run
 from passiflex.views.events import marks_of, spans_of
 from passiflex.views.panel import Curve, Panel
 from passiflex.views.viewed import Viewed, curve, curves, with_curves

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from passiflex.simulation.run import Run
-from passiflex.simulation.run_arm import chain_of
+from passiflex.runs.run import Run
+from passiflex.runs.run_arm import chain_of
 from passiflex.views.events import marks_of, spans_of
 from passiflex.views.panel import Array, Curve, Level, Panel
 from passiflex.views.viewed import Viewed, curve, curves, other_role, with_curves

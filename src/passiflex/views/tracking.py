@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from passiflex.simulation.run import Run
+from passiflex.runs.run import Run
 from passiflex.views.events import marks_of, scenario_of, spans_of
 from passiflex.views.panel import Array, Curve, Panel
 from passiflex.views.viewed import Viewed, curve, curves, first_finite, roles_of, with_curves

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from passiflex.simulation.run import Run
+from passiflex.runs.run import Run
 from passiflex.views.ideal import ideal_motion
 from passiflex.views.panel import Array, Curve, Panel
 

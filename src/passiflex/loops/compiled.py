@@ -1,0 +1,130 @@
+"""A closed loop in native code, built once per structure and shared within the process."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import casadi as cs
+
+from passiflex.control.gravity import AbstractGravity
+from passiflex.control.law import AbstractLaw
+from passiflex.control.task import AbstractTask
+from passiflex.loops.closed_loop import ClosedLoop
+from passiflex.loops.sampled_loop import SampledLoop
+from passiflex.native import (
+    DRIVER,
+    HELD_LOOP_DRIVER,
+    FixedStep,
+    HeldLoop,
+    NativeFunction,
+    compile_functions,
+    load_external,
+)
+from passiflex.robots.arm import SerialArm
+from passiflex.sampled.controller import SampledController
+
+CVODES_DERIVATIVES = {"fd_method": "forward", "is_diff_in": [True, False, False]}
+"""CVODES needs ∂ẋ/∂x only, and one-sided differences are enough for its Newton iteration."""
+
+_built: dict[tuple[str, type[AbstractLaw], AbstractTask, AbstractGravity], CompiledLoop] = {}
+
+_built_sampled: dict[tuple[object, ...], CompiledSampledLoop] = {}
+
+
+@dataclass(frozen=True, eq=False)
+class CompiledLoop:
+    """A closed loop and its compiled functions; all numbers are run-time inputs.
+
+    Attributes
+    ----------
+    loop: The symbolic closed loop.
+    rhs: (x, u, p) → (ẋ, powers), as a CasADi function for CVODES.
+    fixed_step: The same, under held inputs.
+    outputs: (x, u, p) → recorded signals.
+    law: The control law alone.
+    """
+
+    loop: ClosedLoop
+    rhs: cs.Function
+    fixed_step: FixedStep
+    outputs: NativeFunction
+    law: NativeFunction
+
+
+def compiled_loop(law: AbstractLaw) -> CompiledLoop:
+    """Return the compiled closed loop of a law; from the process, the cache on disk, or compiled now."""
+    # The laws are final: their type, task and gravity choice are all that their code depends on.
+    key = (_urdf(law.robot.arm), type(law), law.task, law.gravity)
+    if key not in _built:
+        _built[key] = _compile(ClosedLoop(law))
+    return _built[key]
+
+
+@dataclass(frozen=True, eq=False)
+class CompiledSampledLoop:
+    """A sampled loop and its compiled functions; all numbers are run-time inputs.
+
+    Attributes
+    ----------
+    loop: The symbolic loop.
+    held: The loop through time.
+    plant, control, outputs, row: Its functions, for arrays.
+    """
+
+    loop: SampledLoop
+    held: HeldLoop
+    plant: NativeFunction
+    control: NativeFunction
+    outputs: NativeFunction
+    row: NativeFunction
+
+
+def compiled_sampled_loop(controller: SampledController) -> CompiledSampledLoop:
+    """Return the compiled sampled loop of a controller; from the process, the cache on disk, or compiled now."""
+    key = structure(controller)
+    if key not in _built_sampled:
+        loop = SampledLoop(controller)
+        functions = [loop.plant.rhs, loop.control, loop.outputs, loop.period.function]
+        library = compile_functions([*functions, *loop.watch], driver=HELD_LOOP_DRIVER)
+        native = [NativeFunction(f, library) for f in functions]
+        held = HeldLoop(loop.plant.rhs, loop.control, library, loop.watch)
+        _built_sampled[key] = CompiledSampledLoop(loop, held, *native)
+    return _built_sampled[key]
+
+
+@lru_cache(maxsize=8)
+def interpreted_sampled_loop(controller: SampledController) -> CompiledSampledLoop:
+    """Return the same without compiling anything: for a few evaluations of a loop that nobody runs yet."""
+    if structure(controller) in _built_sampled:
+        return compiled_sampled_loop(controller)
+    loop = SampledLoop(controller)
+    functions = [loop.plant.rhs, loop.control, loop.outputs, loop.period.function]
+    held = HeldLoop(loop.plant.rhs, loop.control, None)
+    return CompiledSampledLoop(loop, held, *(NativeFunction(f) for f in functions))
+
+
+def structure(controller: SampledController) -> tuple[object, ...]:
+    """Return what the code of a sampled loop depends on; controllers that agree in it share compiled code."""
+    law = controller.law
+    return (
+        _urdf(law.robot.arm), type(law), law.task, law.gravity,
+        type(controller.tank), controller.external, controller.inner,
+    )  # fmt: skip
+
+
+@lru_cache(maxsize=64)
+def _urdf(arm: SerialArm) -> str:
+    """Return the text that two arms of the same structure have in common; kept, as a campaign asks for each sample."""
+    return arm.chain.to_urdf()
+
+
+def _compile(loop: ClosedLoop) -> CompiledLoop:
+    library = compile_functions([loop.rhs, loop.outputs, loop.watch, loop.law_function], driver=DRIVER)
+    return CompiledLoop(
+        loop=loop,
+        rhs=load_external("rhs", library, **CVODES_DERIVATIVES) if library else loop.rhs,
+        fixed_step=FixedStep(loop.rhs, library, loop.watch),
+        outputs=NativeFunction(loop.outputs, library),
+        law=NativeFunction(loop.law_function, library),
+    )

@@ -1,0 +1,96 @@
+"""What a sampled loop is told in one period: a pure function of the time, of what was ordered, and of chance."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import casadi as cs
+
+from passiflex.layout import Field, Layout
+from passiflex.loops.motion import MOTION, reference_at
+from passiflex.loops.plant import SURROUNDINGS
+
+
+@dataclass(frozen=True)
+class PeriodRow:
+    """The row of a loop with n joints and k directions of its task.
+
+    `told` holds what stays from one event to the next, `drawn` what is new in every period.
+    """
+
+    n: int
+    k: int
+
+    @cached_property
+    def layout(self) -> Layout:
+        """Return the row; the surroundings come first."""
+        n, k = self.n, self.k
+        return SURROUNDINGS + Layout(
+            (
+                Field("desired_position", (3,), "m", "x_d"),
+                Field("desired_rotation", (3, 3), "1", "axes of x_d"),
+                Field("desired_velocity", (6,), "m/s, rad/s", "ẋ_d"),
+                Field("desired_acceleration", (6,), "m/s^2, rad/s^2", "ẍ_d"),
+                Field("desired_stiffness", (k, k), "N/m, N, N m/rad", "K_x"),
+                Field("desired_damping", (k, k), "N s/m, N s, N m s/rad", "D_x"),
+                Field("feedforward", (6,), "N, N m", "wrench that the end effector is to exert"),
+                Field("torque_noise", (n,), "N m", "of the joint torque sensors"),
+                Field("elapsed", (), "s", "since the last period that ran"),
+            )
+        )
+
+    @cached_property
+    def told(self) -> Layout:
+        """Return what is told at an event, and holds until the next."""
+        k = self.k
+        own = (
+            Field("began", (), "s", "when the motion of the reference began"),
+            Field("old_stiffness", (k, k), "N/m, N, N m/rad", "K_x before the change of gains"),
+            Field("new_stiffness", (k, k), "N/m, N, N m/rad", "and after it"),
+            Field("old_damping", (k, k), "N s/m, N s, N m s/rad", "D_x before the change of gains"),
+            Field("new_damping", (k, k), "N s/m, N s, N m s/rad", "and after it"),
+            Field("change_from", (), "s", "when the change of gains begins"),
+            Field("change_to", (), "s", "when it has ended"),
+            Field("feedforward", (6,), "N, N m", "wrench that the end effector is to exert"),
+        )
+        return SURROUNDINGS + MOTION + Layout(own)
+
+    @cached_property
+    def drawn(self) -> Layout:
+        """Return what is new in every period."""
+        return Layout(tuple(f for f in self.layout if f.name in ("torque_noise", "elapsed")))
+
+    @cached_property
+    def function(self) -> cs.Function:
+        """Return (time, told, drawn) → row. Gains go over to others with minimum jerk."""
+        time = cs.SX.sym("time")
+        told, c = self.told.symbols("told")
+        drawn, chance = self.drawn.symbols("drawn")
+        clock = cs.SX.sym("clock")
+        motion = reference_at(clock, cs.SX(1), c)
+        acceleration = cs.jacobian(motion.velocity, clock)
+        known = cs.Function(
+            "known", [clock, told], [*motion.pose, motion.velocity, acceleration], {"cse": True}
+        )
+        position, rotation, velocity, acceleration = known(cs.fmax(time - c.began, 0), told)
+        s = cs.fmin(cs.fmax((time - c.change_from) / (c.change_to - c.change_from), 0), 1)
+        blend = s**3 * (10 - 15 * s + 6 * s**2)
+        values = {f.name: getattr(c, f.name) for f in SURROUNDINGS} | {
+            "desired_position": position,
+            "desired_rotation": rotation,
+            "desired_velocity": velocity,
+            "desired_acceleration": acceleration,
+            "desired_stiffness": _between(c.old_stiffness, c.new_stiffness, blend),
+            "desired_damping": _between(c.old_damping, c.new_damping, blend),
+            "feedforward": c.feedforward,
+            "torque_noise": chance.torque_noise,
+            "elapsed": chance.elapsed,
+        }
+        row = self.layout.stack(values)
+        return cs.Function("row", [time, told, drawn], [cs.densify(row)], {"cse": True})
+
+
+def _between(old: cs.SX, new: cs.SX, blend: cs.SX) -> cs.SX:
+    """Return what is between old and new, exactly the new in the end."""
+    return cs.if_else(blend >= 1, new, old + blend * (new - old))

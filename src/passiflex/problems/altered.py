@@ -1,0 +1,279 @@
+"""The same problem with another rate, delay, gains or plant: everything that hangs on them goes along."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import yaml
+from numpy.typing import ArrayLike, NDArray
+
+from passiflex.control.rigid import RigidImpedanceLaw
+from passiflex.errors import NameUnknownError, ValueRangeError
+from passiflex.loops.motion import Motion, Pose, pose_at, shifted
+from passiflex.loops.sampled_loop import Parts, SampledLoop
+from passiflex.problems.posture import posture
+from passiflex.problems.problem import Problem, Sampling
+from passiflex.sampled.controller import SampledController
+from passiflex.sampled.matched_loop import MatchedInnerLoop
+from passiflex.scenarios.control_settings import MOST_PERIODS
+from passiflex.scenarios.scenario import Scenario
+from passiflex.scenarios.scenario_file import parse_scenario
+from passiflex.texts.yaml_tree import read_back
+
+Array = NDArray[np.float64]
+
+HIGHEST_RATE = 1e6
+"""[Hz], as in a scenario."""
+MATRICES = ("stiffness", "damping", "target_inertia")
+GAINS = (*MATRICES, "shaped_stiffness", "shaped_inertia", "null_space_damping", "regularisation")
+"""Gains that a scenario can write as numbers, and that can therefore be altered."""
+SECTIONS = ("law", "control", "fallback", "sensors", "motors", "tank", "actions")
+"""Of a scenario; what is written of one leaves the rest of it as it is."""
+DUMPER: Any = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
+"""The one in C takes a tenth of the time."""
+
+
+def altered(
+    problem: Problem,
+    *,
+    rate: float | None = None,
+    delay: float | None = None,
+    gains: Mapping[str, ArrayLike] | None = None,
+    plant: Mapping[str, ArrayLike] | None = None,
+) -> Problem:
+    """Return the sampled problem with what is given in place of its own; what is left out stays.
+
+    The inner loop predicts over the new delay, the noise is held for as many periods, the arm rests under its new
+    weight, the reference begins where the end effector now is, and the configuration says so.
+
+    Parameters
+    ----------
+    rate, delay: [Hz], [s].
+    gains: Of `law.layout`, by name; those of `GAINS`.
+    plant: Of `robot.layout`, by name. The law's model stays as it is.
+
+    Raises
+    ------
+    ValueRangeError, NameUnknownError, SizeError
+        For a problem in continuous time, a rate or delay that makes no sense, gains or numbers that do not fit.
+    """
+    s, law = _sampling(problem), problem.law
+    period, late = require_timing(s.period, s.delay, rate, delay)
+    own = law.layout.unpack(problem.gains)
+    for name in gains or {}:
+        if name not in own or name not in GAINS:
+            raise NameUnknownError("gain", name, [g for g in GAINS if g in own])
+    own |= {name: np.asarray(value, dtype=float) for name, value in (gains or {}).items()}
+    true = law.robot.layout.unpack(problem.plant) | {
+        k: np.asarray(v, float) for k, v in (plant or {}).items()
+    }
+    data = read_back(problem.configuration)
+    if rate is not None or delay is not None:
+        _write_timing(data, period, late, rate)
+    if gains is not None:
+        _write_gains(data["law"], own)
+    if plant is not None:
+        data["robot"] = f"{law.robot.name}, changed in memory"
+
+    parts = SampledLoop(s.controller).parameters
+    kept = data["control"].get("fallback", {})
+    fallback = {k: v for k, v in own.items() if gains and k in gains and k not in kept and not _is_shaping(k)}
+    numbers = replaced(parts, s.numbers, own, "gains")
+    numbers = replaced(parts, numbers, fallback, "fallback")
+    numbers = replaced(parts, numbers, true, "plant")
+    for part in ("inner", "errors"):
+        numbers = replaced(parts, numbers, {"period": period}, part)
+    noise = problem.noise
+    if noise is not None:
+        noise = noise._replace(hold=_held(noise.hold, s.period) * period)
+        numbers = replaced(parts, numbers, {"noise_hold": noise.hold}, "errors")
+    changed = dataclasses.replace(
+        problem,
+        gains=law.layout.pack(own),
+        plant=law.robot.layout.pack(true),
+        noise=noise,
+        output_interval=float(data["output_interval"]),
+        configuration=_text(data),
+        sampling=dataclasses.replace(
+            s,
+            controller=_predicting(s.controller, round(late / period)),
+            period=period,
+            delay=late,
+            numbers=numbers,
+            plant=numbers[: parts.plant.size],
+        ),
+    )
+    return changed if gains is None and plant is None else _at_rest(changed, true)
+
+
+def at_rate(scenario: Scenario, rate: float | None = None, delay: float | None = None) -> Scenario:
+    """Return the scenario sampled at a rate [Hz] and delay [s], its own unless given.
+
+    Raises
+    ------
+    ValueRangeError
+        If neither the scenario nor the caller says a rate, or one of the two makes no sense.
+    """
+    control = scenario.control
+    if control is None and rate is None:
+        raise ValueRangeError(
+            f"scenario {scenario.name!r} has no control rate",
+            needs="`control: {rate: …}`, or a rate beside it",
+            try_="--rate '1 kHz', or rate=1000",
+        )
+    own = (1 / control.rate, control.delay) if control else (math.nan, 0.0)
+    period, late = require_timing(*own, rate, delay)
+    data = read_back(scenario.to_yaml())
+    _write_timing(data, period, late, rate)
+    return parse_scenario(_text(data), source=f"scenario {scenario.name!r}")
+
+
+def rewritten(text: str, entry: Mapping[str, Any]) -> str:
+    """Return a scenario's text with other entries: sections are completed, whatever is in them is replaced whole."""
+
+    def merged(old: Any, new: Mapping[str, Any]) -> dict[str, Any]:
+        out = dict(old or {})
+        for name, value in new.items():
+            out[name] = merged(out.get(name), value) if name in SECTIONS else value
+        return out
+
+    return _text(merged(read_back(text), entry))
+
+
+def with_flange(problem: Problem, inertia: float) -> Problem:
+    """Return the problem with this much more inertia [kg m^2] about every axis of the last link, known to the law."""
+    layout, s = problem.law.robot.layout, _sampling(problem)
+    parts, numbers = SampledLoop(s.controller).parameters, s.numbers
+    heavier: dict[str, Array] = {}
+    for part, flat in (("plant", problem.plant), ("model", problem.model)):
+        tensors = layout.unpack(flat)["link_inertia"].copy()
+        tensors[-1, [0, 3, 5]] += inertia
+        heavier[part] = layout.pack(layout.unpack(flat) | {"link_inertia": tensors})
+        numbers = replaced(parts, numbers, {"link_inertia": tensors}, part)
+    sampling = dataclasses.replace(s, numbers=numbers, plant=numbers[: parts.plant.size])
+    return dataclasses.replace(problem, plant=heavier["plant"], model=heavier["model"], sampling=sampling)
+
+
+def require_timing(
+    period: float, own_delay: float, rate: float | None, delay: float | None
+) -> tuple[float, float]:
+    """Return period and delay [s]: the first two, or what is given in their place.
+
+    Raises
+    ------
+    ValueRangeError
+        For what is no rate, or no delay that a loop at this rate can have.
+    """
+    if rate is not None and not 0 < rate <= HIGHEST_RATE:
+        raise ValueRangeError(
+            "control rate", got=f"{rate:g} Hz", needs=f"above 0, at most {HIGHEST_RATE:g} Hz"
+        )
+    period = period if rate is None else 1 / rate
+    late = own_delay if delay is None else delay
+    if not 0 <= late <= MOST_PERIODS * period * (1 + 1e-9):
+        raise ValueRangeError(
+            "delay of a command",
+            got=f"{late:g} s",
+            needs=f"0 to {MOST_PERIODS} periods, {MOST_PERIODS * period:g} s at this rate",
+        )
+    return period, late
+
+
+def replaced(parts: Parts, numbers: Array, values: Mapping[str, ArrayLike], only: str | None = None) -> Array:
+    """Return the flat parameters of the period with the named ones replaced, in every part that has them.
+
+    `only` names the one part in which they are.
+    """
+    out, start = numbers.copy(), 0
+    for name, part in zip(parts._fields, parts, strict=True):
+        if only in (None, name):
+            for field in part:
+                if field.name in values:
+                    where = part.slices[field.name]
+                    out[start + where.start : start + where.stop] = np.ravel(values[field.name])
+        start += part.size
+    return out
+
+
+def _sampling(problem: Problem) -> Sampling:
+    if problem.sampling is None:
+        raise ValueRangeError(
+            "the scenario has no control rate", got=problem.name, needs="`control: {rate: …}`"
+        )
+    return problem.sampling
+
+
+def _is_shaping(name: str) -> bool:
+    """Return whether the fallback has a value of its own for this gain, whatever the law's."""
+    return name.startswith("shaped_")
+
+
+def _predicting(controller: SampledController, late: int) -> SampledController:
+    if not isinstance(controller.inner, MatchedInnerLoop) or controller.inner.late == late:
+        return controller
+    return dataclasses.replace(controller, inner=MatchedInnerLoop(late))
+
+
+def _at_rest(problem: Problem, plant: dict[str, Array]) -> Problem:
+    """Return the problem with motors, reference and held torque as they are at rest."""
+    law, q = problem.law, problem.q
+    assert problem.sampling is not None
+    weight = posture(law.robot, q, plant).gravity_torque
+    stretch = weight / plant["joint_stiffness"]
+    model, gains = law.robot.layout.unpack(problem.model), law.layout.unpack(problem.gains)
+    K = model["joint_stiffness"]
+    shaped = stretch if isinstance(law, RigidImpedanceLaw) else K / gains["shaped_stiffness"] * stretch
+    home = posture(law.robot, q + shaped, model).pose
+    events = (
+        e if e.motion is None else e._replace(motion=_rebased(e.motion, problem.home, home))
+        for e in problem.events
+    )
+    return dataclasses.replace(
+        problem,
+        theta=q + stretch,
+        home=home,
+        events=tuple(events),
+        sampling=dataclasses.replace(problem.sampling, held=weight),
+    )
+
+
+def _rebased(motion: Motion, old: Pose, new: Pose) -> Motion:
+    """Return a motion that began somewhere seen from `old`, seen from `new`: displacements are in world axes."""
+    begin = pose_at(motion, 0.0)
+    turned = begin.rotation @ old.rotation.T @ new.rotation
+    return shifted(motion, Pose(begin.position + new.position - old.position, turned))
+
+
+def _write_timing(data: dict[str, Any], period: float, delay: float, rate: float | None) -> None:
+    control = data.setdefault("control", {})
+    if data.get("noise"):  # a scenario in continuous time gets a sample in each period
+        own = 1 / control["rate"] if "rate" in control else data["noise"]["hold"]
+        data["noise"]["hold"] = float(_held(data["noise"]["hold"], own) * period)
+    control["delay"] = float(delay)
+    if rate is not None:
+        control["rate"] = float(rate)
+    data["output_interval"] = float(max(1, round(data["output_interval"] / period)) * period)
+
+
+def _held(hold: float, period: float) -> int:
+    """Return for how many periods a sample of the noise is held."""
+    return round(hold / period)
+
+
+def _write_gains(law: dict[str, Any], gains: dict[str, Array]) -> None:
+    for name in GAINS:
+        if name in gains:
+            value = gains[name].tolist()
+            law[name] = {"matrix": value} if name in MATRICES else value
+
+
+def _text(data: dict[str, Any]) -> str:
+    return str(
+        yaml.dump(
+            data, Dumper=DUMPER, sort_keys=False, allow_unicode=True, default_flow_style=None, width=110
+        )
+    )

@@ -1,0 +1,213 @@
+"""From a scenario to numbers: load the robot, build the law, place the start, lay out the events."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import ValidationError
+
+from passiflex.control.gravity import AbstractGravity, MotorGravity, RobotGravity, StaticGravity
+from passiflex.control.law import AbstractLaw, ImpedanceLaw
+from passiflex.control.rigid import RigidImpedanceLaw
+from passiflex.control.task import PoseTask, PositionTask
+from passiflex.errors import ArgumentError, SizeError, ValueRangeError
+from passiflex.problems.gains import law_gains, tank_gains, tank_start
+from passiflex.problems.posture import SINGULAR, held_jacobian, posture
+from passiflex.problems.problem import Noise, Problem
+from passiflex.problems.sampling import sampling
+from passiflex.problems.timeline import timeline
+from passiflex.robots.flexible import FlexibleJointRobot
+from passiflex.scenarios.law_settings import RigidSettings
+from passiflex.scenarios.model_errors import AbstractRelative
+from passiflex.scenarios.scenario import Scenario
+from passiflex.scenarios.scenario_file import parse_scenario
+
+Array = NDArray[np.float64]
+
+STANDARD_GRAVITY = (0.0, 0.0, -9.81)
+TASKS: dict[str, type[PoseTask] | type[PositionTask]] = {"pose": PoseTask, "position": PositionTask}
+GRAVITIES: dict[str, AbstractGravity] = {
+    "robot": RobotGravity(),
+    "motor": MotorGravity(),
+    "static": StaticGravity(),
+    "model": StaticGravity(),  # the rigid law cancels by its model; its plant has gravity
+}
+SCALED = {
+    "joint_stiffness": ("joint_stiffness",),
+    "joint_damping": ("joint_damping",),
+    "motor_inertia": ("motor_inertia",),
+    "link_inertia": ("link_mass", "link_moment", "link_inertia"),
+}
+"""Entry of `deviations` and `model_errors` → the numbers of `FlexibleJointRobot.layout` that it scales."""
+SLOWEST_CONTRACTION = 0.1
+"""Largest |∇²V| / K_e for the static compensation: its eight steps then reach 1e-8 of the weight."""
+REGULAR = 1e-6
+"""Regularisation [1/kg] from which a law may start in a singular posture; the default only guards round-off."""
+
+
+def resolve(scenario: Scenario, robot: FlexibleJointRobot | None = None) -> Problem:
+    """Return the problem that a scenario describes, with another robot in place of its own if one is given.
+
+    Raises
+    ------
+    PassiflexError
+        If the robot cannot be loaded, a size does not fit it, a start is outside the robot's limits or singular.
+    """
+    if not isinstance(scenario, Scenario):
+        raise ArgumentError(
+            scenario, "a scenario", "load_scenario for a file, or simulate, which takes its path"
+        )
+    scenario = _checked(scenario)
+    if robot is None:
+        robot = FlexibleJointRobot.load(scenario.robot)
+    else:  # what is stored beside the result must not pass for the scenario's own robot
+        scenario = scenario.model_copy(update={"robot": f"{robot.name}, changed in memory"})
+    law = _law(scenario, robot)
+    q = _start(scenario, robot)
+    described = robot.nominal(STANDARD_GRAVITY if law.gravity.in_model else (0.0, 0.0, 0.0))
+    arm = robot.arm.chain.with_tool(scenario.tool.position, scenario.tool.rotation_vector)
+    described |= {"tool_position": arm.tip_xyz, "tool_rotation": arm.tip_rotation}
+    plant = _scaled(described, "deviations", scenario.deviations, robot)
+    model = _scaled(described, "model_errors", scenario.model_errors, robot)
+    at_start = posture(robot, q, plant)
+    _refuse_too_few(law)
+    _refuse_singular(scenario, held_jacobian(law.task, at_start))
+    gains = law_gains(scenario, law, model, posture(robot, q, model))
+    if isinstance(law.gravity, StaticGravity) and "shaped_stiffness" in gains:
+        _refuse_soft(robot, q, model, gains["shaped_stiffness"])
+    theta = q + at_start.gravity_torque / plant["joint_stiffness"]
+    shaped = q + model["joint_stiffness"] / gains.get("shaped_stiffness", model["joint_stiffness"]) * (
+        theta - q
+    )
+    home = posture(robot, shaped, model).pose
+    # The law's own damping goes by the robot as described; its weight is the true one.
+    start = at_start._replace(mass_matrix=posture(robot, q, described).mass_matrix)
+    return Problem(
+        name=scenario.name,
+        law=law,
+        plant=robot.layout.pack(plant),
+        model=robot.layout.pack(model),
+        gains=law.layout.pack(gains),
+        tank_gains=tank_gains(scenario),
+        q=q,
+        theta=theta,
+        home=home,
+        tank=tank_start(scenario),
+        events=timeline(scenario, home),
+        noise=Noise(scenario.noise.torque_variance, scenario.noise.hold) if scenario.noise else None,
+        duration=scenario.duration,
+        output_interval=scenario.output_interval,
+        tolerance=scenario.tolerance,
+        seed=scenario.seed,
+        configuration=scenario.to_yaml(),
+        sampling=sampling(scenario, law, plant, model, gains, q, start) if scenario.control else None,
+    )
+
+
+def _checked(scenario: Scenario) -> Scenario:
+    """Return the scenario validated anew, as it may be a changed copy."""
+    try:
+        data = scenario.model_dump(by_alias=True, exclude_none=True, warnings=False)
+        return Scenario.model_validate(data)
+    except ValidationError:  # with the line and column that a mistake has in the scenario's own text
+        return parse_scenario(scenario.to_yaml(), source=f"scenario {scenario.name!r}")
+
+
+def _law(scenario: Scenario, robot: FlexibleJointRobot) -> AbstractLaw:
+    kind = RigidImpedanceLaw if isinstance(scenario.law, RigidSettings) else ImpedanceLaw
+    task = TASKS[scenario.law.task](free=scenario.law.stiffness.free)
+    return kind(robot, task, GRAVITIES[scenario.law.gravity])
+
+
+def _start(scenario: Scenario, robot: FlexibleJointRobot) -> Array:
+    q = np.array(scenario.posture, dtype=float)
+    if q.shape != (robot.n,):
+        raise SizeError(
+            f"posture does not fit robot {robot.name!r}",
+            got=f"{q.size} angles",
+            needs=f"{robot.n} angles in rad",
+        )
+    outside = np.flatnonzero((q < robot.position_limit[:, 0]) | (q > robot.position_limit[:, 1]))
+    if outside.size:
+        i = int(outside[0])
+        low, high = robot.position_limit[i]
+        raise ValueRangeError(
+            f"posture: joint {i + 1} of {robot.name!r} is outside its limits",
+            got=f"{q[i]:g} rad",
+            needs=f"{low:.4g} to {high:.4g} rad",
+            try_="degrees written with their unit, as '30 deg'" if np.abs(q[i]) > 7 else None,
+        )
+    return q
+
+
+def _refuse_too_few(law: AbstractLaw) -> None:
+    """Raise ValueRangeError for a pose that has more directions to hold than the robot has joints."""
+    held = len(law.task.held)
+    if isinstance(law.task, PoseTask) and law.robot.n < held:
+        raise ValueRangeError(
+            f"task 'pose' holds {held} directions, more than robot {law.robot.name!r} can move in",
+            got=f"{law.robot.n} joints",
+            needs="at least as many joints as directions that are held",
+            try_="task: position, or free directions: stiffness and damping 0 in them, as rotation: [30, 30, 0]",
+        )
+
+
+def _refuse_singular(scenario: Scenario, jacobian: Array) -> None:
+    """Raise ValueRangeError where Λ of (31) does not exist and the law needs it."""
+    values = np.linalg.svd(jacobian, compute_uv=False)
+    enough = values.size == len(jacobian)
+    rigid, regularisation = isinstance(scenario.law, RigidSettings), scenario.law.regularisation
+    if values[-1] >= SINGULAR * values[0] and (enough or (regularisation > 0 and not rigid)):
+        return
+    if regularisation >= REGULAR and not rigid:
+        return
+    got = (
+        f"smallest singular value of J {values[-1]:.2e}"
+        if values.size == len(jacobian)
+        else f"{values.size} joints"
+    )
+    raise ValueRangeError(
+        f"posture is singular for task {scenario.law.task!r}"
+        + (", where the rigid law is not defined" if rigid else ""),
+        got=got,
+        needs=f"an end effector that can move in all {len(jacobian)} directions of the task",
+        try_="another posture, task: position, or "
+        + ("the impedance law" if rigid else f"regularisation of {REGULAR:g} 1/kg or more"),
+    )
+
+
+def _refuse_soft(robot: FlexibleJointRobot, q: Array, model: dict[str, Array], K_e: Array) -> None:
+    """Raise ValueRangeError where the fixed point of the static compensation contracts too slowly."""
+    step = 1e-5
+    slopes = [
+        (posture(robot, q + h, model).gravity_torque - posture(robot, q - h, model).gravity_torque)
+        / (2 * step)
+        for h in step * np.eye(robot.n)
+    ]
+    contraction = float(np.abs(np.linalg.eigvals(np.array(slopes).T / K_e[:, None])).max())
+    if contraction > SLOWEST_CONTRACTION:
+        raise ValueRangeError(
+            "shaped_stiffness is too soft for gravity: static, the default",
+            got=f"the weight's slope is {contraction:.0%} of K_e",
+            needs=f"at most {SLOWEST_CONTRACTION:.0%}, so that its fixed point is found",
+            try_="a stiffer shaped_stiffness, or gravity: motor",
+        )
+
+
+def _scaled(
+    described: dict[str, Array], entry: str, relative: AbstractRelative, robot: FlexibleJointRobot
+) -> dict[str, Array]:
+    """Return the robot's numbers times 1 + `relative`, which is the scenario's section `entry`."""
+    scaled = dict(described)
+    for name, numbers in SCALED.items():
+        value = np.asarray(getattr(relative, name))
+        if value.size not in (1, robot.n):
+            raise SizeError(
+                f"{entry}.{name} does not fit robot {robot.name!r}",
+                got=f"{value.size} numbers",
+                needs=f"one number or {robot.n}",
+            )
+        for number in numbers:
+            rows = described[number].reshape(robot.n, -1)
+            scaled[number] = (rows * (1 + value.reshape(-1, 1))).reshape(described[number].shape)
+    return scaled

@@ -1,0 +1,250 @@
+"""From the settings of a sampled run to numbers: controller, sensors, motors, and what changes in flight."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from passiflex.control.law import AbstractLaw
+from passiflex.control.tank import NO_CAP
+from passiflex.errors import SizeError
+from passiflex.loops.sampled_loop import SampledLoop
+from passiflex.problems.gains import sized
+from passiflex.problems.posture import Posture
+from passiflex.problems.problem import GainChange, Interval, Sampling
+from passiflex.robots.flexible import FlexibleJointRobot
+from passiflex.sampled.controller import SampledController
+from passiflex.sampled.external import (
+    AbstractExternalTorque,
+    MeasuredWrench,
+    MomentumObserver,
+    NoTorque,
+    TrueTorque,
+)
+from passiflex.sampled.inner_loop import AbstractInnerLoop, PlainInnerLoop
+from passiflex.sampled.matched_loop import MatchedInnerLoop
+from passiflex.sampled.measurement_bound import BEND
+from passiflex.sampled.motors import UNLIMITED_TORQUE
+from passiflex.sampled.sensors import UNFILTERED
+from passiflex.sampled.tanks import TANKS
+from passiflex.scenarios.control_settings import Actions, Control, MotorSettings, SensorSettings
+from passiflex.scenarios.law_settings import ImpedanceSettings
+from passiflex.scenarios.noise_settings import Noise
+from passiflex.scenarios.scenario import Scenario
+from passiflex.scenarios.tank_settings import TankSettings
+
+Array = NDArray[np.float64]
+
+EXTERNAL: dict[str, AbstractExternalTorque] = {
+    "true": TrueTorque(),
+    "measured": MeasuredWrench(),
+    "observer": MomentumObserver(),
+    "none": NoTorque(),
+}
+
+POSTURE_RATIO = 0.7
+"""Damping ratio of the spring to a posture, joint by joint, unless its damping is given."""
+INNER: dict[str, Callable[[int], AbstractInnerLoop]] = {
+    "plain": lambda late: PlainInnerLoop(),
+    "matched": MatchedInnerLoop,
+}
+VELOCITY_GAIN, ACCELERATION_GAIN = 0.3, 0.05
+"""Of the matched inner loop's estimates: of those that were tried at 1 kHz, the best compromise between the
+torque's noise and the lag in q̇, which acts as further inertia; from 0.2 on the second gain destabilises."""
+
+
+def sampling(
+    scenario: Scenario,
+    law: AbstractLaw,
+    plant: dict[str, Array],
+    model: dict[str, Array],
+    gains: dict[str, Array],
+    q: Array,
+    start: Posture,
+) -> Sampling:
+    """Return how the law of a scenario runs on its robot.
+
+    Raises
+    ------
+    SizeError
+        For a list of numbers that does not fit the robot's joints.
+    """
+    control = scenario.control
+    assert control is not None
+    robot = law.robot
+    tank = scenario.tank
+    controller = SampledController(
+        law,
+        TANKS[tank.kind or "port"]() if tank and law.has_tank else None,
+        EXTERNAL[control.external_torque],
+        INNER[control.inner_loop](round(control.delay * control.rate)),
+    )
+    motors, sensors = scenario.motors or MotorSettings(), scenario.sensors or SensorSettings()
+    friction: dict[str, Any] = {
+        "coulomb_friction": _joints(robot, "motors.coulomb_friction", motors.coulomb_friction),
+        "viscous_friction": _joints(robot, "motors.viscous_friction", motors.viscous_friction),
+        "friction_width": motors.friction_width,
+    }
+    parts = SampledLoop(controller).parameters
+    plant_numbers = parts.plant.pack(plant | friction)
+    moved = np.diag(start.mass_matrix) + gains.get("shaped_inertia", model["motor_inertia"])
+    numbers = [
+        plant_numbers,
+        parts.model.pack(model),
+        parts.gains.pack(gains),
+        parts.fallback.pack(_fallback(control, scenario, robot, model, gains)),
+        parts.tank.pack(_tank(tank)),
+        parts.actions.pack(_actions(scenario.actions or Actions(), robot, q, moved)),
+        parts.observer.pack({"bandwidth": _pole(control.observer_bandwidth)}),
+        parts.inner.pack(
+            {
+                "period": 1 / control.rate,
+                "velocity_gain": VELOCITY_GAIN,
+                "acceleration_gain": ACCELERATION_GAIN,
+            }
+        ),
+        parts.errors.pack(_errors(control, sensors, scenario.noise, robot)),
+        parts.sensors.pack(_sensors(sensors, robot)),
+        parts.limits.pack(_limits(motors, robot)),
+    ]
+    return Sampling(
+        controller=controller,
+        period=1 / control.rate,
+        delay=control.delay,
+        jitter=control.jitter,
+        missed=control.missed,
+        insist=control.insist,
+        numbers=np.concatenate(numbers),
+        plant=plant_numbers,
+        held=start.gravity_torque,
+        gains=_gain_changes(scenario, gains),
+        feedforward=tuple(
+            Interval(f.start, f.end, np.array([*f.force, *f.moment])) for f in scenario.feedforward
+        ),
+        drags=tuple(Interval(d.start, d.end, np.array([d.viscous, d.dry])) for d in scenario.drags),
+    )
+
+
+def _joints(robot: FlexibleJointRobot, name: str, value: ArrayLike) -> Array:
+    if np.size(value) not in (1, robot.n):
+        raise SizeError(
+            f"{name} does not fit robot {robot.name!r}",
+            got=f"{np.size(value)} numbers",
+            needs=f"one number or {robot.n}",
+        )
+    return np.broadcast_to(np.asarray(value, dtype=float), robot.n).copy()
+
+
+def _pole(frequency: float) -> float:
+    """Return the pole [rad/s] of a frequency [Hz]."""
+    return UNFILTERED if math.isinf(frequency) else 2 * math.pi * frequency
+
+
+def _fallback(
+    control: Control,
+    scenario: Scenario,
+    robot: FlexibleJointRobot,
+    model: dict[str, Array],
+    gains: dict[str, Array],
+) -> dict[str, Array]:
+    if not isinstance(scenario.law, ImpedanceSettings):
+        return gains
+    wanted = control.fallback
+    changed = {
+        name: sized(f"control.fallback.{name}", getattr(wanted, name), model[own], robot)
+        for name, own in (("shaped_stiffness", "joint_stiffness"), ("shaped_inertia", "motor_inertia"))
+    }
+    for name, matrix in (("stiffness", wanted.stiffness), ("damping", wanted.damping)):
+        if matrix is not None:
+            changed[name] = matrix.full()
+    return gains | changed
+
+
+def _tank(tank: TankSettings | None) -> dict[str, float]:
+    t = tank or TankSettings()
+    return {
+        "tank_floor": t.floor,
+        "tank_low": t.low,
+        "tank_cap": min(t.cap, NO_CAP),
+        "tank_power": min(t.power, NO_CAP),
+        "tank_trip": t.floor / 2 if t.trip is None else t.trip,
+        "tank_signed": float(t.signed),
+        "tank_fill": t.fill,
+        "tank_braking": t.braking,
+    }
+
+
+def _actions(
+    actions: Actions, robot: FlexibleJointRobot, q: Array, inertia: Array
+) -> dict[str, Array | float]:
+    """Return the numbers of the actions; `inertia` (n,) is what each joint moves at the start, B_e included."""
+    posture = q if actions.posture is None else np.array(actions.posture)
+    if posture.shape != (robot.n,):
+        raise SizeError(
+            f"actions.posture does not fit robot {robot.name!r}",
+            got=f"{posture.size} angles",
+            needs=f"{robot.n} angles in rad",
+        )
+    stiffness = _joints(robot, "actions.posture_stiffness", actions.posture_stiffness)
+    damping: ArrayLike = 2 * POSTURE_RATIO * np.sqrt(stiffness * inertia)
+    if actions.posture_damping is not None:
+        damping = actions.posture_damping
+    return {
+        "posture_stiffness": stiffness,
+        "posture_damping": _joints(robot, "actions.posture_damping", damping),
+        "posture": posture,
+        "follow_velocity": actions.follow_velocity,
+        "follow_acceleration": actions.follow_acceleration,
+    }
+
+
+def _sensors(sensors: SensorSettings, robot: FlexibleJointRobot) -> dict[str, Array | float]:
+    numbers: dict[str, Array | float] = {
+        "link_resolution": sensors.link_resolution,
+        "motor_resolution": sensors.motor_resolution,
+        "velocity_differences": float(sensors.velocity == "differences"),
+        "velocity_bandwidth": _pole(sensors.velocity_filter),
+        "torque_bandwidth": _pole(sensors.torque_bandwidth),
+        "wrench_bandwidth": _pole(sensors.wrench_bandwidth),
+    }
+    for name in ("torque_scale", "torque_offset", "link_offset", "motor_offset"):
+        numbers[name] = _joints(robot, f"sensors.{name}", getattr(sensors, name))
+    return numbers
+
+
+def _errors(
+    control: Control, sensors: SensorSettings, noise: Noise | None, robot: FlexibleJointRobot
+) -> dict[str, Array | float]:
+    """Return how large the errors of the sensors are, which the law's books know; their signs they do not."""
+    return {
+        "torque_scale": np.abs(_joints(robot, "sensors.torque_scale", sensors.torque_scale)),
+        "torque_offset": np.abs(_joints(robot, "sensors.torque_offset", sensors.torque_offset)),
+        "torque_bandwidth": _pole(sensors.torque_bandwidth),
+        "link_resolution": sensors.link_resolution,
+        "noise_deviation": math.sqrt(noise.torque_variance) if noise else 0.0,
+        "noise_hold": noise.hold if noise else 0.0,
+        "noise_credit": 0.0,  # of the loop: see `noise_credit.charged`
+        "bend": BEND,
+        "period": 1 / control.rate,
+    }
+
+
+def _limits(motors: MotorSettings, robot: FlexibleJointRobot) -> dict[str, Array]:
+    unlimited = np.full(robot.n, UNLIMITED_TORQUE)
+    limit = robot.torque_limit if motors.torque_limit == "robot" else unlimited
+    rate = np.full(robot.n, min(motors.torque_rate_limit, UNLIMITED_TORQUE))
+    return {"torque_limit": np.minimum(limit, UNLIMITED_TORQUE), "torque_rate_limit": rate}
+
+
+def _gain_changes(scenario: Scenario, gains: dict[str, Array]) -> tuple[GainChange, ...]:
+    stiffness, damping = gains["stiffness"], gains["damping"]
+    changes = []
+    for change in scenario.gains:
+        stiffness = stiffness if change.stiffness is None else change.stiffness.full()
+        damping = damping if change.damping is None else change.damping.full()
+        changes.append(GainChange(change.at, change.at + change.duration, stiffness, damping))
+    return tuple(changes)

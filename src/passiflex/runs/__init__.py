@@ -1,0 +1,1 @@
+"""A run, its file, and what is left of a damaged one."""

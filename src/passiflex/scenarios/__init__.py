@@ -1,0 +1,1 @@
+"""What a scenario file says: its entries with units, and their mistakes."""

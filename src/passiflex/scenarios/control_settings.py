@@ -1,0 +1,237 @@
+"""The settings of a sampled run in a scenario file: controller, sensors, motors, and what users add. SI units."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import BeforeValidator, Field, model_validator
+
+from passiflex.scenarios.law_settings import (
+    Damping,
+    ShapedInertia,
+    ShapedStiffness,
+    Stiffness,
+    free_mistakes,
+)
+from passiflex.texts.quantity import Quantity, shown
+from passiflex.texts.section import Mistakes, Section
+
+Vector = tuple[float, ...]
+Found = list[tuple[tuple[str | int, ...], str]]
+"""Mistakes, each with its place."""
+Seconds = Annotated[float, Quantity("s", above=0)]
+Instant = Annotated[float, Quantity("s", least=0)]
+Frequency = Annotated[float, Quantity("Hz", above=0, finite=False)]
+Angle = Annotated[float, Quantity("rad", least=0)]
+Share = Annotated[float, Quantity("1", least=0, most=1)]
+PerJoint = ((), (None,))
+ENDLESS = float("inf")
+NOW = 1e-9
+"""Two instants closer than this are one [s]."""
+MOST_PERIODS = 20
+"""Longest delay, in control periods; a loop that is later controls nothing."""
+
+
+def _flag(written: Any) -> bool:
+    if not isinstance(written, bool):
+        raise ValueError(f"expected true or false; got {shown(written)}")
+    return written
+
+
+class Fallback(Section):
+    """The law that takes over, for good, once the port tank is overdrawn: it holds the pose just read."""
+
+    shaped_stiffness: ShapedStiffness = Field(
+        default=ShapedStiffness(ratio=1.0), description="its K_e: {ratio: multiple of K}, or in N m/rad"
+    )
+    shaped_inertia: ShapedInertia = Field(
+        default=ShapedInertia(ratio=1.0), description="its B_e: {ratio: multiple of B}, or in kg m^2"
+    )
+    stiffness: Stiffness | None = Field(default=None, description="its K_x; the law's own if left out")
+    damping: Damping | None = Field(default=None, description="its D_x; the law's own if left out")
+
+
+class Control(Section):
+    """The law runs once per period; its command is held until the next one arrives."""
+
+    rate: Annotated[float, Quantity("Hz", above=0, most=1e6)] = Field(description="control rate, Hz")
+    delay: Instant = Field(
+        default=0.0,
+        description="from a sample to the arrival of its command, s; the matched inner loop predicts over "
+        "whole periods",
+    )
+    jitter: Instant = Field(
+        default=0.0, description="each command is late by up to this much more, uniformly, s"
+    )
+    missed: Annotated[float, Quantity("1", least=0, most=0.9)] = Field(
+        default=0.0, description="share of periods in which the law does not run, at random"
+    )
+    inner_loop: Literal["plain", "matched"] = Field(
+        default="plain",
+        description="plain: the continuous law at the sample; matched: predicted over the delay, and matched "
+        "to the shaped motor at the end of the hold",
+    )
+    external_torque: Literal["true", "measured", "observer", "none"] = Field(
+        default="measured",
+        description="τ_e of the law: the truth, the wrench sensor's, a momentum observer's, or none",
+    )
+    observer_bandwidth: Frequency = Field(default=50.0, description="pole of the momentum observer, Hz")
+    fallback: Fallback = Field(
+        default=Fallback(), description="the law that takes over when the tank is overdrawn"
+    )
+    insist: Annotated[bool, BeforeValidator(_flag)] = Field(
+        default=False, description="run the law even at a rate and delay at which it is unstable"
+    )
+
+    @model_validator(mode="after")
+    def _few_on_their_way(self) -> Self:
+        periods = (self.delay + self.jitter) * self.rate
+        if periods > MOST_PERIODS:
+            written = "delay" if "delay" in self.model_fields_set else "jitter"
+            raise Mistakes(
+                (
+                    (written,),
+                    f"delay and jitter together are at most {MOST_PERIODS} periods; got {periods:.4g} periods",
+                )
+            )
+        return self
+
+
+class SensorSettings(Section):
+    """What the sensors make of the truth; without it they tell the truth.
+
+    Offsets and scale stay what they are for the whole run. The controller is not corrected for them: its
+    books know how large they may be, not their sign.
+    """
+
+    torque_offset: Annotated[float | Vector, Quantity("N m", PerJoint)] = Field(
+        default=0.0, description="τ_a is read this much too high, one number for all joints or one each, N m"
+    )
+    torque_scale: Annotated[float | Vector, Quantity("1", PerJoint, least=-0.5, most=0.5)] = Field(
+        default=0.0, description="τ_a is read 1 + this times as large, one number or one each"
+    )
+    link_offset: Annotated[float | Vector, Quantity("rad", PerJoint)] = Field(
+        default=0.0, description="q is read this much too high, one number or one each, rad"
+    )
+    motor_offset: Annotated[float | Vector, Quantity("rad", PerJoint)] = Field(
+        default=0.0, description="θ is read this much too high, one number or one each, rad"
+    )
+    link_resolution: Angle = Field(default=0.0, description="resolution of q, rad; 0 for none")
+    motor_resolution: Angle = Field(default=0.0, description="resolution of θ, rad; 0 for none")
+    velocity: Literal["true", "differences"] = Field(
+        default="true", description="q̇ and θ̇: the truth, or differences of the position readings"
+    )
+    velocity_filter: Frequency = Field(
+        default=ENDLESS, description="pole of the low-pass of the differences, Hz; inf for none"
+    )
+    torque_bandwidth: Frequency = Field(
+        default=ENDLESS, description="pole of the joint torque sensors, Hz; inf for none"
+    )
+    wrench_bandwidth: Frequency = Field(
+        default=ENDLESS, description="pole of the wrench sensor, Hz; inf for none"
+    )
+
+
+class MotorSettings(Section):
+    """What the motors make of a command; without it they give it exactly."""
+
+    torque_limit: Literal["none", "robot"] = Field(
+        default="none", description="largest torque: none, or that of the robot's description"
+    )
+    torque_rate_limit: Annotated[float, Quantity("N m/s", above=0, finite=False)] = Field(
+        default=ENDLESS, description="fastest change of the torque, N m/s; inf for none"
+    )
+    coulomb_friction: Annotated[float | Vector, Quantity("N m", PerJoint, least=0)] = Field(
+        default=0.0, description="at the motors, one number for all joints or one each, N m"
+    )
+    viscous_friction: Annotated[float | Vector, Quantity("N m s/rad", PerJoint, least=0)] = Field(
+        default=0.0, description="at the motors, one number for all joints or one each, N m s/rad"
+    )
+    friction_width: Annotated[float, Quantity("rad/s", above=0)] = Field(
+        default=0.01, description="speed over which Coulomb friction changes its sign, rad/s"
+    )
+
+
+class Actions(Section):
+    """What is not passive, and only acts as far as the tank's valve is open."""
+
+    posture_stiffness: Annotated[float | Vector, Quantity("N m/rad", PerJoint, least=0)] = Field(
+        default=0.0, description="of a spring in the null space toward `posture`, N m/rad"
+    )
+    posture_damping: Annotated[float | Vector, Quantity("N m s/rad", PerJoint, least=0)] | None = Field(
+        default=None,
+        description="of the same motion, N m s/rad; a ratio of 0.7 of each joint at the start if left out",
+    )
+    posture: Annotated[Vector, Quantity("rad", ((None,),))] | None = Field(
+        default=None, description="joint angles that this spring pulls to, rad; the start if left out"
+    )
+    follow_velocity: Share = Field(default=0.0, description="share of D_x ẋ_d that is fed forward, 0 to 1")
+    follow_acceleration: Share = Field(default=0.0, description="share of Λ ẍ_d that is fed forward, 0 to 1")
+
+
+class Interval(Section):
+    """From one instant to another."""
+
+    start: Instant = Field(alias="from", description="when it begins, s")
+    end: Instant = Field(alias="to", description="when it ends, s")
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        if not self.end > self.start:
+            raise Mistakes((("to",), f"needs to be later than from = {self.start:g} s; got {self.end:g} s"))
+        return self
+
+
+class Feedforward(Interval):
+    """A wrench that the end effector is to exert for some time, as far as the valve is open."""
+
+    force: Annotated[Vector, Quantity("N", ((3,),))] = Field(
+        default=(0.0, 0.0, 0.0), description="force in world axes, N"
+    )
+    moment: Annotated[Vector, Quantity("N m", ((3,),))] = Field(
+        default=(0.0, 0.0, 0.0), description="moment in world axes, N m"
+    )
+
+
+class Drag(Interval):
+    """The end effector moves through something that takes energy out, as in polishing."""
+
+    viscous: Annotated[float, Quantity("N s/m", least=0)] = Field(default=0.0, description="N s/m")
+    dry: Annotated[float, Quantity("N", least=0)] = Field(default=0.0, description="against the motion, N")
+
+
+class GainChange(Section):
+    """K_x and D_x go over to other values, smoothly (minimum jerk) and without a bump."""
+
+    at: Instant = Field(description="when it begins, s")
+    duration: Seconds = Field(description="how long it takes, s")
+    stiffness: Stiffness | None = Field(default=None, description="K_x at the end; stays if left out")
+    damping: Damping | None = Field(default=None, description="D_x at the end; stays if left out")
+
+
+def change_mistakes(changes: Sequence[GainChange], task: str, free: tuple[int, ...]) -> Found:
+    """Return what of the changes overlaps, or does not fit the task."""
+    found: Found = []
+    for i, change in enumerate(changes):
+        if i and not change.at >= changes[i - 1].at + changes[i - 1].duration - NOW:
+            found.append(((i, "at"), f"the change before lasts longer; got {change.at:g} s"))
+        found += [((i, *place), text) for place, text in gain_mistakes(change, task, free)]
+    return found
+
+
+def gain_mistakes(given: Fallback | GainChange, task: str, free: tuple[int, ...]) -> Found:
+    """Return what of the gains does not fit the task, whose axes `free` they have to leave free."""
+    found: Found = []
+    if given.damping is not None and given.damping.ratio is not None:
+        found.append((("damping",), "a damping ratio belongs to one posture; give D_x itself"))
+    for name, part in (("stiffness", given.stiffness), ("damping", given.damping)):
+        try:
+            if part is None:
+                continue
+            part.require(task)
+        except Mistakes as mistakes:
+            found += [((name, *place), text) for place, text in mistakes.entries]
+        else:
+            found += [((name,), text) for text in [free_mistakes(part, free)] if text]
+    return found

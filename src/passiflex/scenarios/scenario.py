@@ -1,0 +1,288 @@
+"""What one simulation is: robot, law, tank, reference, forces, model errors, noise; in SI units."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal, Self
+
+import yaml
+from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
+
+from passiflex.scenarios.control_settings import (
+    Actions,
+    Control,
+    Drag,
+    Feedforward,
+    GainChange,
+    Interval,
+    MotorSettings,
+    SensorSettings,
+    change_mistakes,
+    gain_mistakes,
+)
+from passiflex.scenarios.law_settings import ImpedanceSettings, RigidSettings
+from passiflex.scenarios.model_errors import Deviations, ModelErrors
+from passiflex.scenarios.noise_settings import Noise
+from passiflex.scenarios.row_interval import fitting_interval, interval_mistake
+from passiflex.scenarios.tank_settings import TankSettings
+from passiflex.texts.quantity import Quantity, shown
+from passiflex.texts.section import Mistakes, Section
+
+Vector = tuple[float, ...]
+Seconds = Annotated[float, Quantity("s", above=0)]
+Instant = Annotated[float, Quantity("s", least=0)]
+Length = Annotated[Vector, Quantity("m", ((3,),))]
+Turn = Annotated[Vector, Quantity("rad", ((3,),))]
+ZERO = (0.0, 0.0, 0.0)
+
+
+class Tool(Section):
+    """Where the end effector is, seen from the robot's own."""
+
+    position: Length = Field(
+        default=ZERO, description="offset of the end effector, in the axes of the robot's own, m"
+    )
+    rotation_vector: Turn = Field(default=ZERO, description="turn of the end effector's axes, rad")
+
+
+class Step(Section):
+    """The reference jumps."""
+
+    at: Instant = Field(description="when it begins, s")
+    kind: Literal["step"] = Field(description="step, move, circle or hold")
+    by: Length = Field(description="displacement in world axes, m")
+    turn: Turn = Field(default=ZERO, description="rotation vector of the turn in world axes, rad")
+
+
+class Move(Section):
+    """The reference moves with minimum jerk."""
+
+    at: Instant = Field(description="when it begins, s")
+    kind: Literal["move"] = Field(description="step, move, circle or hold")
+    by: Length = Field(description="displacement in world axes, m")
+    duration: Seconds = Field(description="how long the move takes, s")
+
+
+def _axes(written: Any) -> tuple[str, str]:
+    """Return two different axes, as lower-case letters."""
+    axes = [str(a).lower() for a in written] if isinstance(written, list | tuple) else []
+    if len(axes) != 2 or not set(axes) <= set("xyz") or axes[0] == axes[1]:
+        raise ValueError(f"expected two different axes of x, y, z; got {shown(written)}")
+    return axes[0], axes[1]
+
+
+class Circle(Section):
+    """The reference goes round a circle, from where it is and in the direction of the plane's first axis."""
+
+    at: Instant = Field(description="when it begins, s")
+    kind: Literal["circle"] = Field(description="step, move, circle or hold")
+    plane: Annotated[tuple[Literal["x", "y", "z"], Literal["x", "y", "z"]], BeforeValidator(_axes)] = Field(
+        description="list of two world axes, as [y, z]: the direction of the start, and towards the centre"
+    )
+    radius: Annotated[float, Quantity("m", above=0)] = Field(description="radius, m")
+    period: Seconds = Field(description="time of one turn, s")
+
+
+class Hold(Section):
+    """The reference stops."""
+
+    at: Instant = Field(description="when it begins, s")
+    kind: Literal["hold"] = Field(description="step, move, circle or hold")
+
+
+ReferenceEvent = Annotated[Step | Move | Circle | Hold, Field(discriminator="kind")]
+
+
+class Force(Interval):
+    """A constant wrench on the end effector for some time; wrenches that overlap add up."""
+
+    force: Annotated[Vector, Quantity("N", ((3,),))] = Field(
+        default=ZERO, description="force in world axes, N"
+    )
+    moment: Annotated[Vector, Quantity("N m", ((3,),))] = Field(
+        default=ZERO, description="moment in world axes, N m"
+    )
+
+
+def _own_tank(data: dict[str, Any]) -> TankSettings | None:
+    if not isinstance(data.get("law"), ImpedanceSettings):
+        return None
+    return TankSettings().completed("port" if data.get("control") else "paper")
+
+
+QUICK_DUMPER = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
+"""That of LibYAML where there is one: a campaign writes down each of its samples."""
+WITH_CONTROL = ("sensors", "motors", "actions", "gains", "feedforward", "drags")
+"""Entries of a scenario that only a sampled run has."""
+
+
+class Scenario(Section):
+    """One simulation, complete: with the package's version it gives the same result again."""
+
+    name: str = Field(
+        pattern=r"^[A-Za-z0-9_.-]+$",
+        max_length=100,
+        description="name of the run: letters, digits, and any of _ . -",
+    )
+    description: str = Field(default="", description="what it shows")
+    robot: str = Field(min_length=1, description="name in the catalogue, or path of a robot file (.yaml)")
+    tool: Tool = Field(default=Tool(), description="end effector, seen from the robot's own")
+    posture: Annotated[Vector, Quantity("rad", ((None,),))] = Field(
+        description="joint angles at the start, at rest, rad"
+    )
+    law: Annotated[ImpedanceSettings | RigidSettings, Field(discriminator="type")] = Field(
+        description="control law"
+    )
+    control: Control | None = Field(
+        default=None, description="a controller that samples; continuous time if left out"
+    )
+    tank: TankSettings | None = Field(
+        default_factory=_own_tank, description="energy tank; with the impedance law only"
+    )
+    duration: Seconds = Field(description="simulated time, s")
+    reference: tuple[ReferenceEvent, ...] = Field(
+        default=(), description="what the reference does, in the order of time"
+    )
+    forces: tuple[Force, ...] = Field(default=(), description="external forces on the end effector")
+    deviations: Deviations = Field(
+        default=Deviations(), description="by how much the robot differs from its description"
+    )
+    model_errors: ModelErrors = Field(
+        default=ModelErrors(), description="by how much the law's model differs from the robot's description"
+    )
+    noise: Noise | None = Field(
+        default=None,
+        description="noise on the measured joint torque, which the rigid law does not use; none if left out",
+    )
+    sensors: SensorSettings | None = Field(default=None, description="sensors, with control only")
+    motors: MotorSettings | None = Field(default=None, description="motors, with control only")
+    actions: Actions | None = Field(default=None, description="gated actions, with control only")
+    gains: tuple[GainChange, ...] = Field(
+        default=(), description="changes of K_x and D_x in the order of time, with control only"
+    )
+    feedforward: tuple[Feedforward, ...] = Field(
+        default=(), description="wrenches that the end effector is to exert, with control only"
+    )
+    drags: tuple[Drag, ...] = Field(default=(), description="drags at the end effector, with control only")
+    output_interval: Seconds = Field(
+        default_factory=fitting_interval,
+        validate_default=True,
+        description="time between two rows of the result, s; with control a whole multiple of the period, "
+        "without it of noise.hold; the one nearest to 0.005 s if left out",
+    )
+    tolerance: Annotated[float, Quantity("1", least=1e-13, most=1e-3)] = Field(
+        default=1e-9, description="relative tolerance of the integrator"
+    )
+    seed: int = Field(default=0, ge=0, strict=True, description="seed of the noise")
+
+    @field_validator("tank")
+    @classmethod
+    def _tank_of_the_law(cls, tank: TankSettings | None, info: ValidationInfo) -> TankSettings | None:
+        if tank is None:
+            return None
+        if isinstance(info.data.get("law"), RigidSettings):
+            raise ValueError("only the impedance law has a tank; remove it, or take law type: impedance")
+        sampled = info.data.get("control", "in error") is not None
+        if not sampled and tank.kind not in (None, "paper"):
+            raise Mistakes(
+                (("kind",), f"a tank of kind {tank.kind} needs `control`, a rate at which it runs")
+            )
+        if "law" in info.data:
+            tank.require(info.data["law"].gravity)
+        tank = tank.completed("port" if sampled else "paper")
+        if "control" in info.data:
+            tank.require_used(sampled=sampled)
+        return tank
+
+    @field_validator("control")
+    @classmethod
+    def _control_of_the_law(cls, control: Control | None, info: ValidationInfo) -> Control | None:
+        if control is None or "law" not in info.data:
+            return control
+        if isinstance(info.data["law"], RigidSettings):
+            if control.inner_loop == "matched":
+                raise Mistakes((("inner_loop",), "the rigid law has no inner loop; take plain"))
+            return control
+        found = gain_mistakes(control.fallback, info.data["law"].task, info.data["law"].stiffness.free)
+        if found:
+            raise Mistakes(*((("fallback", *place), text) for place, text in found))
+        return control
+
+    @model_validator(mode="after")
+    def _tank_with_a_use(self) -> Self:
+        gating = self.control is None or self.actions or self.feedforward
+        try:
+            if self.tank is not None and not gating:
+                self.tank.require_gated()
+        except Mistakes as mistakes:
+            raise Mistakes(*((("tank", *place), text) for place, text in mistakes.entries)) from None
+        return self
+
+    @field_validator(*WITH_CONTROL)
+    @classmethod
+    def _only_sampled(cls, entry: Any, info: ValidationInfo) -> Any:
+        if entry and "control" in info.data and info.data["control"] is None:
+            raise ValueError("needs `control`: only a sampled run has it")
+        return entry
+
+    @field_validator("gains")
+    @classmethod
+    def _gains_of_the_task(
+        cls, changes: tuple[GainChange, ...], info: ValidationInfo
+    ) -> tuple[GainChange, ...]:
+        law = info.data.get("law")
+        found = change_mistakes(changes, law.task, law.stiffness.free) if law else []
+        if found:
+            raise Mistakes(*found)
+        return changes
+
+    @field_validator("noise")
+    @classmethod
+    def _whole_periods(cls, noise: Noise | None, info: ValidationInfo) -> Noise | None:
+        control = info.data.get("control")
+        if noise is not None and control is not None:
+            return noise.fitted(control.rate)
+        return noise
+
+    @field_validator("reference")
+    @classmethod
+    def _in_order(cls, events: tuple[Any, ...], info: ValidationInfo) -> tuple[Any, ...]:
+        found: list[tuple[tuple[str | int, ...], str]] = []
+        end = info.data.get("duration", float("inf"))
+        positions = "law" in info.data and info.data["law"].task == "position"
+        for i, event in enumerate(events):
+            got = f"got {event.at:g} s"
+            if i and not event.at > events[i - 1].at:
+                found.append(
+                    ((i, "at"), f"needs to be later than the one before, {events[i - 1].at:g} s; {got}")
+                )
+            if not event.at < end:
+                found.append(((i, "at"), f"needs to be earlier than the end, {end:g} s; {got}"))
+            if positions and getattr(event, "turn", ZERO) != ZERO:
+                found.append(((i, "turn"), "a position task has no orientation; remove it"))
+        if found:
+            raise Mistakes(*found)
+        return events
+
+    @field_validator("forces", "gains", "feedforward", "drags")
+    @classmethod
+    def _within_the_run(cls, entries: tuple[Any, ...], info: ValidationInfo) -> tuple[Any, ...]:
+        end = info.data.get("duration", float("inf"))
+        begin = [("at", e.at) if isinstance(e, GainChange) else ("from", e.start) for e in entries]
+        needs = f"needs to be earlier than the end, {end:g} s"
+        late = [((i, name), f"{needs}; got {t:g} s") for i, (name, t) in enumerate(begin) if not t < end]
+        if late:
+            raise Mistakes(*late)
+        return entries
+
+    @field_validator("output_interval")
+    @classmethod
+    def _whole_samples(cls, interval: float, info: ValidationInfo) -> float:
+        if mistake := interval_mistake(interval, info.data):
+            raise ValueError(mistake)
+        return interval
+
+    def to_yaml(self) -> str:
+        """Return the text of a file that loads to an equal scenario: complete and in SI units."""
+        data = self.model_dump(by_alias=True, exclude_none=True)
+        layout: dict[str, Any] = {"sort_keys": False, "allow_unicode": True, "default_flow_style": None}
+        return str(yaml.dump(data, Dumper=QUICK_DUMPER, width=110, **layout))

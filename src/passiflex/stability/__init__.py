@@ -1,0 +1,1 @@
+"""The linear loop, and the one judgement of whether it holds."""

@@ -1,0 +1,284 @@
+"""The sampled loop near rest, as matrices of one period: which gains are stable at a rate and delay, and how fast."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from passiflex.errors import ValueRangeError
+from passiflex.loops.compiled import compiled_sampled_loop, interpreted_sampled_loop
+from passiflex.loops.plant import SURROUNDINGS
+from passiflex.problems.altered import replaced
+from passiflex.problems.posture import held_jacobian
+from passiflex.problems.problem import Problem
+from passiflex.stability.exponential import exponential
+from passiflex.stability.law_slope import Gains, LawSlope, differences
+from passiflex.stability.loop_at_rest import Standing, standing
+from passiflex.stability.modes import Modes, Spectrum
+from passiflex.stability.timing import Timing
+
+Array = NDArray[np.float64]
+
+NODES, WEIGHTS = (np.polynomial.legendre.leggauss(4)[0] + 1) / 2, np.polynomial.legendre.leggauss(4)[1] / 2
+"""Of a quadrature over 0 to 1."""
+
+
+class DrivenLoop(NamedTuple):
+    """z⁺ = A z + G w, τ = C z + D w: the loop with the noise w of the torque sensors, and its command τ.
+
+    Attributes
+    ----------
+    A: (N, N), what `LinearLoop.matrix` returns.
+    G, C, D: (N, n), (n, N), (n, n).
+    """
+
+    A: Array
+    G: Array
+    C: Array
+    D: Array
+
+
+class LinearLoop:
+    """The linear approximation of a sampled problem at its start, for any rate, delay and gains.
+
+    The plant is discretised exactly under held commands (matrix exponential); the law's part is its derivative
+    (`LawSlope`). Left out is what has no linear approximation: resolution, limits,
+    Coulomb friction, and a tank that runs empty.
+
+    A delay that is given here is the robot's: the law goes on to predict over the one that it was built
+    for. Where the law is to know of it, make the loop of `altered(problem, delay=…)`.
+
+    Parameters
+    ----------
+    problem: Sampled.
+    at: Another robot or posture than the problem's own; the law knows nothing of it.
+    native: Whether to compile what is not compiled yet; without, a few evaluations are sooner done.
+    """
+
+    def __init__(self, problem: Problem, at: Standing | None = None, *, native: bool = True):
+        if problem.sampling is None:
+            raise ValueRangeError(
+                "the scenario has no control rate", got=problem.name, needs="`control: {rate: …}`"
+            )
+        self.problem, self.s, self.at = problem, problem.sampling, at or standing(problem)
+        self.native = native
+        build = compiled_sampled_loop if native else interpreted_sampled_loop
+        self.compiled = build(problem.sampling.controller)
+        self.n = problem.law.robot.n
+        self.parts = self.compiled.loop.parameters
+        self.law = LawSlope(problem, self.at, self.compiled)
+        self.remembered, self.x = self.law.remembered, self.law.x
+        self._flows: dict[float, tuple[Array, Array]] = {}
+        self._kin: LinearLoop | None = None
+
+    def spectrum(
+        self, period: float | None = None, delay: float | None = None, gains: Gains | None = None
+    ) -> Spectrum:
+        """Return the dominant mode; period and delay [s] and gains are the problem's own unless given."""
+        T = self.s.period if period is None else period
+        modes = Modes.of(self.matrix(period, delay, gains), T, self.task_jacobian)
+        return modes.dominant(self.n, self.kinetic)
+
+    def radius(
+        self, period: float | None = None, delay: float | None = None, gains: Gains | None = None
+    ) -> float:
+        """Return the spectral radius alone, in half the time; drift is no part of it."""
+        T = self.s.period if period is None else period
+        return Modes.radius_of(self.matrix(period, delay, gains), T, self.task_jacobian)
+
+    def trembling(self, delay: float, gains: Gains, settling: float) -> float:
+        """Return the radius of what trembles, as `Modes.trembling_of` has it."""
+        matrix = self.matrix(None, delay, gains)
+        return Modes.trembling_of(matrix, self.s.period, self.task_jacobian, settling)
+
+    def matrix(
+        self,
+        period: float | None = None,
+        delay: float | None = None,
+        gains: Gains | None = None,
+        lined: int = 0,
+    ) -> Array:
+        """Return the map of (x, what is remembered, commands on their way) over one period.
+
+        With room for at least `lined` commands, so that maps of other delays are as large.
+        """
+        timing = self._timing(period, delay, lined)
+        return self.flow(timing) @ self.runs(timing, gains)
+
+    def driven(
+        self, period: float | None = None, delay: float | None = None, gains: Gains | None = None
+    ) -> DrivenLoop:
+        """Return the same with the noise of the torque sensors, and the command that it makes."""
+        timing = self._timing(period, delay)
+        flow, ran = self.flow(timing), self.runs(timing, gains, noise=True)
+        size = flow.shape[0]
+        sent = ran[self._told : self._told + self.n]
+        return DrivenLoop(flow @ ran[:, :size], flow @ ran[:, size:], sent[:, :size], sent[:, size:])
+
+    def runs(
+        self, timing: Timing, gains: Gains | None = None, elapsed: float | None = None, *, noise: bool = False
+    ) -> Array:
+        """Return what the law does at a sample: (x, memory, commands) → the same with its own command first.
+
+        `elapsed` [s] is the time since it last ran, one period unless given. With noise, further columns.
+        """
+        law = self._control(timing.period, elapsed or timing.period, dict(gains or {}), noise)
+        n, told = self.n, self._told
+        heard = law.shape[1] - told
+        out = np.zeros((told + (timing.lined + 1) * n, told + timing.lined * n + heard))
+        out[: self.x.size, : self.x.size] = np.eye(self.x.size)
+        out[self.x.size : told + n, :told] = law[:, :told]
+        out[self.x.size : told + n, told + timing.lined * n :] = law[:, told:]
+        out[told + n :, told : told + timing.lined * n] = np.eye(timing.lined * n)
+        return out
+
+    def misses(self, timing: Timing) -> Array:
+        """Return what a sample does at which the law does not run: the last command goes on, nothing is remembered."""
+        n, told = self.n, self._told
+        out = np.zeros((told + (timing.lined + 1) * n, told + timing.lined * n))
+        out[:told, :told] = np.eye(told)
+        out[told + n :, told:] = np.eye(timing.lined * n)
+        out[told : told + n, told : told + n] = np.eye(n)
+        return out
+
+    def flow(self, timing: Timing) -> Array:
+        """Return what a period does after its sample: the plant moves, the commands come nearer."""
+        n, n_x, told = self.n, self.x.size, self._told
+        out = np.zeros((told + timing.lined * n, told + (timing.lined + 1) * n))
+
+        def sent(ago: int) -> slice:
+            return slice(told + ago * n, told + (ago + 1) * n)
+
+        if timing.part:
+            early, gain_early = self._held(timing.part * timing.period)
+            rest, gain_rest = self._held((1 - timing.part) * timing.period)
+            out[:n_x, :n_x] = rest @ early
+            out[:n_x, sent(timing.whole + 1)] = rest @ gain_early
+            out[:n_x, sent(timing.whole)] += gain_rest
+        else:
+            out[:n_x, :n_x], out[:n_x, sent(timing.whole)] = self._held(timing.period)
+        out[n_x:told, n_x:told] = np.eye(told - n_x)
+        out[told:, told : told + timing.lined * n] = np.eye(timing.lined * n)
+        return out
+
+    def without_actions(self) -> LinearLoop:
+        """Return the loop with the tank's valve shut."""
+        still = {"posture_stiffness": np.zeros(self.n)}
+        numbers = replaced(self.parts, self.s.numbers, still, "actions")
+        sampling = dataclasses.replace(self.s, numbers=numbers)
+        problem = dataclasses.replace(self.problem, sampling=sampling)
+        return LinearLoop(problem, self.at, native=self.native)
+
+    def fallback(self) -> dict[str, Array]:
+        """Return the gains of the law that takes over when the tank is overdrawn."""
+        before = self.parts[: self.parts._fields.index("fallback")]
+        start = sum(part.size for part in before)
+        return self.parts.fallback.unpack(self.s.numbers[start : start + self.parts.fallback.size])
+
+    def beside(self, at: Standing) -> LinearLoop:
+        """Return the loop of another robot at the same posture, which makes its law's derivative from this one's.
+
+        The law sees the robot by its readings only: K and D of τ_a = K (θ − q) + D (θ̇ − q̇). Exact where no weight
+        is carried; where one is, the law's point of rest is taken to be this one's.
+        """
+        other = LinearLoop(self.problem, at, native=self.native)
+        other._kin = self
+        return other
+
+    def heard(self, at: Standing, period: float, elapsed: float, gains: Gains) -> Array:
+        """Return what another robot's τ_a adds to the law's derivative by x: it is all that the law sees of a robot."""
+        law = (self._kin or self).law
+        by_torque = law.by(period, elapsed, gains)[:, self._told :]
+        return np.asarray(by_torque @ (law.torque(at) - law.torque(self.at)))
+
+    def by_plant(self, timing: Timing, left: NDArray[Any], ran: NDArray[Any]) -> NDArray[Any]:
+        """Return the derivative of leftᴴ `flow` ran by the entries of [A B] of the plant (m, 4n, 5n).
+
+        With ẋ = A x + B u it is ∫ p (x, u)ᵀ dt, where ṗ = −Aᵀ p leads to `left` at the period's end; by Gauss's
+        quadrature. Columns of `left` and of `ran`, what the law leaves of a vector, go in pairs.
+        """
+        n, n_x, told = self.n, self.x.size, self._told
+        p_end, x = left[:n_x].conj().T, ran[:n_x]
+        pieces = [(timing.whole + 1, timing.part), (timing.whole, 1 - timing.part)]
+        out = np.zeros((left.shape[1], n_x, n_x + n), dtype=complex)
+        for i, (ago, share) in enumerate(pieces):
+            if not share:
+                continue
+            long, u = share * timing.period, ran[told + ago * n : told + (ago + 1) * n]
+            rest = self._held(pieces[1][1] * timing.period)[0] if i == 0 else np.eye(n_x)
+            for node, mirrored, weight in zip(NODES, NODES[::-1], WEIGHTS, strict=True):
+                moved, pushed = self._held(node * long)
+                p = p_end @ rest @ self._held(mirrored * long)[0]
+                here = np.concatenate([moved @ x + pushed @ u, u])
+                out += weight * long * np.einsum("mi,jm->mij", p, here)
+            moved, pushed = self._held(long)
+            x = moved @ x + pushed @ u
+        return out
+
+    def plants(self, others: Sequence[Standing]) -> Array:
+        """Return [A B] of other robots, or of this one elsewhere (N, 4n, 5n): all by one call of compiled code."""
+        where = [np.concatenate([at.q, at.theta, np.zeros(2 * self.n), at.held]) for at in others]
+        points, steps = zip(*(differences(x) for x in where), strict=True)
+        rows = np.vstack(points)
+        numbers = np.repeat([self._smooth(at) for at in others], len(points[0]), axis=0)
+        u = np.hstack([rows[:, self.x.size :], np.zeros((len(rows), SURROUNDINGS.size))])
+        values = self.compiled.plant.map(rows[:, : self.x.size], u, numbers)[0]
+        split = values.reshape(len(others), 2, len(steps[0]), -1)
+        change = (split[:, 0] - split[:, 1]) / (2 * np.array(steps))[:, :, None]
+        return np.asarray(change.transpose(0, 2, 1))
+
+    @cached_property
+    def task_jacobian(self) -> Array:
+        """Return the task's Jacobian here (k, n), its lengths in units of the arm's reach."""
+        task, J = self.problem.law.task, held_jacobian(self.problem.law.task, self.at.arm)
+        reach = max(float(np.linalg.norm(self.at.arm.jacobian[:3], axis=0).max()), 1e-12)
+        return np.asarray(J / np.array([reach if axis < 3 else 1.0 for axis in task.held])[:, None])
+
+    @property
+    def kinetic(self) -> Array:
+        """Return the inertia of links and motors (2n,): what each joint moves, the others held [kg m²]."""
+        motors = self.parts.plant.unpack(self.at.plant)["motor_inertia"]
+        return np.concatenate([np.diag(self.at.arm.mass_matrix), motors])
+
+    @property
+    def _told(self) -> int:
+        """Return the size of (x, what is remembered)."""
+        return self.x.size + self.remembered.size
+
+    def _timing(self, period: float | None, delay: float | None, lined: int = 0) -> Timing:
+        T = self.s.period if period is None else period
+        return Timing.of(T, self.s.delay if delay is None else delay, lined)
+
+    @cached_property
+    def plant(self) -> Array:
+        """Return [A B] of the plant at rest."""
+        return np.asarray(self.plants([self.at])[0])
+
+    def _smooth(self, at: Standing) -> Array:
+        """Return a robot's numbers without dry friction."""
+        layout = self.parts.plant
+        return layout.pack(layout.unpack(at.plant) | {"coulomb_friction": np.zeros(self.n)})
+
+    def _held(self, time: float) -> tuple[Array, Array]:
+        """Return Φ and Γ of the plant over `time` under a held command."""
+        if time not in self._flows:
+            n_x = self.x.size
+            block = np.zeros((n_x + self.n, n_x + self.n))
+            block[:n_x] = self.plant
+            whole = exponential(block * time)
+            self._flows[time] = whole[:n_x, :n_x], whole[:n_x, n_x:]
+        return self._flows[time]
+
+    def _control(self, period: float, elapsed: float, gains: Gains, noise: bool) -> Array:
+        """Return the law's derivative, by the noise too if wanted."""
+        kin = self._kin
+        found = (kin or self).law.by(period, elapsed, gains)
+        if kin is not None:
+            found = found.copy()
+            found[:, : self.x.size] += kin.heard(self.at, period, elapsed, gains)
+        return found if noise else found[:, : self._told]

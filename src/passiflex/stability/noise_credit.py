@@ -1,0 +1,78 @@
+"""What torque noise that lasts credits a measured tank with on average, by the linear loop, without drawing.
+
+The law answers a noise n on τ_a with motion. If n lasts, the motion comes while n still does, on average against it:
+E[nᵀ q̇] < 0, and a tank that books τ_aᵀ q̇ is credited with energy that nobody gave, linearly in time.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from passiflex.loops.sampled_loop import SampledLoop
+from passiflex.problems.altered import replaced
+from passiflex.problems.problem import Problem
+from passiflex.stability.linear_loop import DrivenLoop, LinearLoop
+
+POSTURES = 1.5
+"""Factor on the credit at the start, for other postures on the way: of 40 random ones of the iiwa 14, the median had
+1.0 and the largest 1.2 to 1.6 times as much, the more the longer the noise lasts."""
+SETTLED = 1e-9
+"""Relative change in a period below which an answer has settled."""
+REACH = 1.0
+"""Displacement [rad, m] up to which a linear loop is believed: a self-motion that nothing holds never stops in it."""
+
+
+def mean_credit(loop: DrivenLoop, joints: int, variance: float, lasting: int) -> float:
+    """Return the mean of −Σ ½ (n_k + n_k+1)ᵀ (q_k+1 − q_k) per period [J], for noise n of this variance [(N m)²].
+
+    Each sample of the noise lasts for so many periods L, and is independent of all before it, so that only
+    its own answer counts: with R_j the derivative of q_j by a noise held from period 0 on, by parts,
+    −½ σ² tr(R_L + R_L−1) / L. The first `joints` states are q. An answer of more than `REACH` ends there.
+    """
+    answer, before = np.zeros_like(loop.G), np.zeros_like(loop.G)
+    deviation = np.sqrt(variance)
+    for _ in range(lasting):
+        answer, before = loop.A @ answer + loop.G, answer
+        moved = np.abs(answer[:joints]).max()
+        still = np.abs((answer - before)[:joints]).max() < SETTLED * moved
+        if still or deviation * moved > REACH:
+            break
+    return -variance * float(np.trace((answer + before)[:joints])) / (2 * lasting)
+
+
+def noise_credit(problem: Problem) -> float:
+    """Return the mean power [W] that the noise of a sampled problem credits its tank with, ≥ 0.
+
+    That of its gains, of those that it changes to, and of its fallback, the largest, at the start. Gains that
+    are not stable have none. White noise, new in each period, is followed by no motion that it still could meet.
+    """
+    s, noise = problem.sampling, problem.noise
+    if s is None or noise is None or not noise.variance:
+        return 0.0
+    lasting = round(noise.hold / s.period)
+    if lasting <= 1:
+        return 0.0
+    loop = LinearLoop(problem)
+    later: list[Mapping[str, ArrayLike]] = [{"stiffness": c.stiffness, "damping": c.damping} for c in s.gains]
+    powers = [
+        mean_credit(loop.driven(gains=gains), loop.n, noise.variance, lasting) / s.period
+        for gains in ({}, *later, loop.fallback())
+        if loop.radius(gains=gains) < 1
+    ]
+    return max(0.0, *powers) if powers else 0.0
+
+
+def charged(problem: Problem) -> Problem:
+    """Return the sampled problem with the credit of its noise, `POSTURES` times, declared to its controller."""
+    s = problem.sampling
+    credit = noise_credit(problem)
+    if s is None or not credit:
+        return problem
+    numbers = replaced(
+        SampledLoop(s.controller).parameters, s.numbers, {"noise_credit": POSTURES * credit}, "errors"
+    )
+    return dataclasses.replace(problem, sampling=dataclasses.replace(s, numbers=numbers))

@@ -1,0 +1,300 @@
+"""What would make a law hold that does not: every change that is offered was tried, by the judge that refused."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from passiflex.errors import PassiflexError
+from passiflex.problems.altered import altered, rewritten, with_flange
+from passiflex.problems.problem import Problem
+from passiflex.problems.resolution import resolve
+from passiflex.sampled.matched_loop import MatchedInnerLoop
+from passiflex.scenarios.scenario_file import parse_scenario
+from passiflex.stability.clock_words import hertz
+from passiflex.stability.judgement import Judgement, holds, judged_fallback
+from passiflex.stability.trial import Change, Trial
+
+Array = NDArray[np.float64]
+
+LIGHTEST = 4.0
+"""Largest B_e/B that is offered."""
+WEAKER = np.geomspace(0.8, 0.01, 12)
+STRONGER = np.geomspace(1.25, 100, 12)
+DAMPINGS = (2.0, 5.0, 10.0, 20.0, 50.0, 0.0)
+"""k_ns [1/s] that are tried."""
+FASTER = np.geomspace(1.25, 200, 16)
+SHARES = (0.75, 0.5, 0.25, 0.1, 0.0)
+"""Of a delay or of the periods that are missed."""
+TOOL = 0.02
+"""Inertia of a tool [kg m^2] that a bare flange may lack."""
+INSIDE = 1.2
+"""How far beyond a border a gain is offered."""
+
+
+class Remedy(NamedTuple):
+    """A change after which the law holds.
+
+    Attributes
+    ----------
+    words: What to change, and from what.
+    entry: What to write into the scenario; empty for what is no entry of it, as a tool.
+    """
+
+    words: str
+    entry: Mapping[str, Any]
+
+
+def remedies(problem: Problem, found: Judgement) -> Iterator[Remedy]:
+    """Yield what makes an unstable problem hold, the change of a number first; all were tried as a whole scenario."""
+    trial = Trial(problem, found)
+    for look in LOST if found.missed else FAST:
+        for remedy in look(trial):
+            if _is_new(problem, remedy) and _tried(problem, remedy):
+                yield remedy
+    if holds(with_flange(problem, TOOL), native=False):
+        yield Remedy(f"a tool with an inertia of {TOOL:g} kg m² on the flange, in the robot's file too", {})
+
+
+def _inertia(t: Trial) -> Iterator[Remedy]:
+    """Yield B_e of the joint that moves most, or of all joints that are lighter than needed."""
+    if not t.shapes:
+        return
+    own = t.gains["shaped_inertia"] / t.own_inertia
+    joint = t.found.spectrum.joint - 1
+    alone = np.arange(own.size) == joint
+    everyone = ("each joint", np.ones(own.size, dtype=bool))
+    for who, mask in (
+        (everyone,) if t.found.missed or own.size == 1 else ((f"joint {joint + 1}", alone), everyone)
+    ):
+
+        def raised(ratio: float, mask: NDArray[np.bool_] = mask) -> Array:
+            return np.where(mask, np.maximum(own, ratio), own)
+
+        start = float(own[mask].min())
+        border = _least(
+            lambda r: t.stable(lambda g: {**g, "shaped_inertia": raised(r) * t.own_inertia}),
+            start,
+            *((5, 1.4) if t.found.missed else ()),
+        )
+        if border is not None:
+            ratio = [float(f"{v:.3g}") for v in raised(min(rounded_up(INSIDE * border), LIGHTEST))]
+            words = f"B_e of {who} at least {border:.2g} B (now {start:.2g} B)"
+            yield Remedy(words, _law(t, {"shaped_inertia": {"ratio": ratio}}))
+            return
+
+
+def _unshaped(t: Trial) -> Iterator[Remedy]:
+    """Yield K_e = K, with a B_e for it."""
+    if not t.shapes or np.allclose(t.gains["shaped_stiffness"], t.own_stiffness):
+        return
+    own = float((t.gains["shaped_inertia"] / t.own_inertia).min())
+
+    def changed(ratio: float) -> Change:
+        return lambda g: {
+            **g,
+            "shaped_stiffness": t.own_stiffness,
+            "shaped_inertia": np.maximum(g["shaped_inertia"], ratio * t.own_inertia),
+        }
+
+    border = own if t.stable(changed(own)) else _least(lambda r: t.stable(changed(r)), own)
+    if border is None:
+        return
+    entry: dict[str, Any] = {"shaped_stiffness": {"ratio": 1}}
+    words = "K_e = K"
+    if border > own:
+        entry["shaped_inertia"] = {"ratio": min(rounded_up(INSIDE * border), LIGHTEST)}
+        words += f" with B_e at least {border:.2g} B"
+    yield Remedy(words, _law(t, entry))
+
+
+def _damping(t: Trial) -> Iterator[Remedy]:
+    yield from _scaled(t, "damping", "D_x")
+
+
+def _stiffness(t: Trial) -> Iterator[Remedy]:
+    yield from _scaled(t, "stiffness", "K_x")
+
+
+def _scaled(t: Trial, name: str, symbol: str) -> Iterator[Remedy]:
+    """Yield a gain times the factor nearest to 1 that holds, lower as well as higher."""
+    if t.found.part == "gains":
+        return  # which of the changes is to be another, its author knows
+    found = []
+    for factors in (WEAKER, STRONGER):
+
+        def times(factor: float) -> Change:
+            return lambda g: {**g, name: factor * g[name]}
+
+        factor = next((f for f in map(float, factors) if t.stable(times(f))), None)
+        if factor is not None:
+            found.append(float(f"{factor / INSIDE if factor < 1 else factor * INSIDE:.2g}"))
+    for factor in sorted(found, key=lambda f: abs(math.log(f))):
+        entry = {name: {"matrix": (factor * t.gains[name]).tolist()}}
+        yield Remedy(f"{symbol} times {factor:g}", _law(t, entry))
+
+
+def _softer(t: Trial) -> Iterator[Remedy]:
+    """Yield a softer law, where neither K_x nor D_x alone is enough: at the same damping ratio, or both alike."""
+    if t.found.part == "gains" or any(
+        True for name in ("damping", "stiffness") for _ in _scaled(t, name, "")
+    ):
+        return
+    own = {"shaped_stiffness": t.own_stiffness, "shaped_inertia": t.own_inertia} if t.shapes else {}
+    own = {name: value for name, value in own.items() if not np.allclose(t.gains[name], value)}
+    for unshaped in (False, True) if own else (False,):
+        for power in (2, 1):
+
+            def scaled(f: float, power: int = power, unshaped: bool = unshaped) -> Change:
+                return lambda g: {
+                    **g,
+                    "stiffness": f**power * g["stiffness"],
+                    "damping": f * g["damping"],
+                    **(own if unshaped else {}),
+                }
+
+            factor = next((f for f in map(float, WEAKER) if t.stable(scaled(f))), None)
+            if factor is not None:
+                f = float(f"{factor / INSIDE:.2g}")
+                softer = scaled(f)(t.gains)
+                entry: dict[str, Any] = {n: {"matrix": softer[n].tolist()} for n in ("stiffness", "damping")}
+                words = f"K_x times {f**power:.2g} with D_x times {f:g}"
+                for name in own if unshaped else ():
+                    entry[name] = {"ratio": 1}
+                    words += ", K_e = K" if name == "shaped_stiffness" else ", B_e = B"
+                yield Remedy(words, _law(t, entry))
+
+
+def _self_motion(t: Trial) -> Iterator[Remedy]:
+    n, k = t.problem.law.robot.n, t.problem.law.task.size
+    if n <= k or t.found.part == "fallback":
+        return
+    now = float(t.gains["null_space_damping"])
+
+    def damped(value: float) -> Change:
+        return lambda g: {**g, "null_space_damping": np.array(value)}
+
+    for value in DAMPINGS:
+        if value != now and t.stable(damped(value)):
+            words = f"null_space_damping of {value:g} 1/s (now {now:g})"
+            yield Remedy(words, {"law": {"null_space_damping": value}})
+            return
+
+
+def _missed(t: Trial) -> Iterator[Remedy]:
+    now = t.loop.s.missed
+    share = next((s for s in SHARES if now and t.stable(missed=s * now)), None)
+    if share is not None:
+        words = f"at most {100 * share * now:.2g} % of the periods missed (now {100 * now:.2g} %)"
+        yield Remedy(words, {"control": {"missed": share * now}})
+
+
+def _rate(t: Trial) -> Iterator[Remedy]:
+    """Yield a higher rate, with as many periods of delay."""
+    factor = next((f for f in map(float, FASTER) if t.stable(stretched=1 / f)), None)
+    if factor is None:
+        return
+    s = t.loop.s
+    rows = 1 / t.problem.output_interval  # of which the new rate is a multiple, so that the rows still fit
+    rate = math.ceil(INSIDE * factor / s.period / rows - 1e-9) * rows
+    late, jitter = s.delay / s.period / rate, s.jitter / s.period / rate
+    what = " and ".join(name for name, value in (("delay", late), ("jitter", jitter)) if value)
+    words = f"a rate of {hertz(rate)}" + (f", with as many periods of {what}" if what else "")
+    yield Remedy(words, {"control": {"rate": rate, "delay": late, "jitter": jitter}})
+
+
+def _delay(t: Trial) -> Iterator[Remedy]:
+    """Yield less delay, if the loop was not built for its own."""
+    s = t.loop.s
+    if isinstance(s.controller.inner, MatchedInnerLoop):
+        return
+    now = s.delay + s.jitter
+    share = next((v for v in SHARES if now and t.stable(late=v * now)), None)
+    if share is not None:
+        late = float(f"{share * now:.3g}")
+        entry = {"control": {"delay": min(s.delay, late), "jitter": max(late - s.delay, 0.0)}}
+        least = f"a delay of at most {1e3 * late:.3g} ms" if late else "no delay"
+        yield Remedy(f"{least} (now {1e3 * now:.3g} ms)", entry)
+
+
+def _jitter(t: Trial) -> Iterator[Remedy]:
+    s = t.loop.s
+    if s.jitter and t.stable(late=s.delay):
+        yield Remedy(f"no jitter (now {1e3 * s.jitter:.3g} ms)", {"control": {"jitter": 0.0}})
+
+
+def _as_the_law(t: Trial) -> Iterator[Remedy]:
+    """Yield a fallback that is shaped as the law is, which holds if that law does."""
+    if t.found.part != "fallback" or not t.shapes or t.loop.s.insist:
+        return
+    own = t.problem.law.layout.unpack(t.problem.gains)
+    shaping = {name: own[name].tolist() for name in ("shaped_stiffness", "shaped_inertia")}
+    yield Remedy("a fallback that is shaped as the law is", {"control": {"fallback": shaping}})
+
+
+def _other_loop(t: Trial) -> Iterator[Remedy]:
+    if not t.shapes:
+        return
+    matched = isinstance(t.loop.s.controller.inner, MatchedInnerLoop)
+    inner = "plain" if matched else "matched"
+    control = {"inner_loop": inner} | ({} if matched else {"external_torque": "none"})
+    told = "" if matched else ", with external_torque: none"
+    yield Remedy(f"the {inner} inner loop{told}", {"control": control})
+
+
+FAST = (
+    _jitter, _inertia, _unshaped, _damping, _stiffness, _softer, _as_the_law, _self_motion, _rate, _delay,
+    _other_loop,
+)  # fmt: skip
+LOST = (_missed, _inertia, _other_loop)
+"""What is tried, where periods are missed and where they are not: their judgement takes a hundred times as long."""
+
+
+def _law(t: Trial, entry: Mapping[str, Any]) -> Mapping[str, Any]:
+    return {"control": {"fallback": entry}} if t.found.part == "fallback" else {"law": entry}
+
+
+def _is_new(problem: Problem, remedy: Remedy) -> bool:
+    return rewritten(problem.configuration, remedy.entry) != rewritten(problem.configuration, {})
+
+
+def _tried(problem: Problem, remedy: Remedy) -> bool:
+    """Return whether the judge lets the whole changed scenario pass, on the robot of the problem."""
+    try:
+        text = rewritten(problem.configuration, remedy.entry)
+        changed = resolve(parse_scenario(text, "remedy"), problem.law.robot)
+        if not np.array_equal(changed.plant, problem.plant):
+            changed = altered(changed, plant=problem.law.robot.layout.unpack(problem.plant))
+        if (
+            changed.sampling is not None and changed.sampling.insist
+        ):  # then it is the fallback that has to hold
+            alone = judged_fallback(changed)
+            return alone is None or alone.stable
+        return holds(changed, native=False)
+    except PassiflexError:
+        return False
+
+
+def _least(
+    stable: Callable[[float], bool], start: float, points: int = 17, precision: float = 1.02
+) -> float | None:
+    """Return the least ratio above `start` that holds; None if none up to `LIGHTEST` does."""
+    tried = np.geomspace(start, max(LIGHTEST, start), points + 1)[1:]
+    high = next((float(r) for r in tried if stable(float(r))), None)
+    if high is None:
+        return None
+    low = high * start / float(tried[0])
+    while high / low > precision:
+        middle = math.sqrt(low * high)
+        low, high = (low, middle) if stable(middle) else (middle, high)
+    return high
+
+
+def rounded_up(value: float) -> float:
+    """Return the value with two digits, rounded up."""
+    step = 10 ** (math.floor(math.log10(value)) - 1)
+    return math.ceil(round(value / step, 6)) * step
