@@ -7,7 +7,7 @@ Matrices are stored row by row.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from math import prod
@@ -22,12 +22,27 @@ from passiflex.errors import NameUnknownError, SizeError, ValueRangeError
 
 
 class Field(NamedTuple):
-    """One named entry of a layout."""
+    """One named entry of a layout, and all that is to be said of it.
+
+    Attributes
+    ----------
+    axes: Names of its axes in a run; without them, each is the joints.
+    kept: Whether a run has it.
+    acts: Whether it is remembered and may act back on a command.
+    """
 
     name: str
     shape: tuple[int, ...]
     unit: str
     meaning: str = ""
+    axes: tuple[str, ...] = ()
+    kept: bool = True
+    acts: bool = False
+
+    @property
+    def dims(self) -> tuple[str, ...]:
+        """Return the names of its axes."""
+        return self.axes or ("joint",) * len(self.shape)
 
     @property
     def size(self) -> int:
@@ -60,6 +75,19 @@ class Layout:
     def size(self) -> int:
         """Return the length of the flat vector."""
         return sum(f.size for f in self.fields)
+
+    def columns(self, chosen: Callable[[Field], bool]) -> NDArray[np.intp]:
+        """Return the places in the flat vector of the fields that are chosen."""
+        return np.flatnonzero(np.repeat([chosen(f) for f in self.fields], [f.size for f in self.fields]))
+
+    @property
+    def kept(self) -> Layout:
+        """Return the fields that a run has."""
+        return Layout(tuple(f for f in self.fields if f.kept))
+
+    def zeros(self) -> dict[str, NDArray[np.float64]]:
+        """Return zeros by name."""
+        return {f.name: np.zeros(f.shape) for f in self.fields}
 
     def symbols(self, name: str) -> tuple[cs.SX, SimpleNamespace]:
         """Return a fresh symbolic vector and its named views."""

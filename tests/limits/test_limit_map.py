@@ -21,7 +21,7 @@ from passiflex.limits.planes import Plane, least_inertias, scaled_impedance, sta
 from passiflex.limits.subject import sampled_problem, with_task
 from passiflex.problems.altered import altered
 from passiflex.simulation import Problem, parse_scenario, resolve
-from passiflex.simulation import admissible as border
+from passiflex.stability import admissible as border
 from passiflex.stability.admissible import shaping
 from passiflex.stability.linear_loop import LinearLoop
 from worlds import PLAIN, merged, world

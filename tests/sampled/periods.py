@@ -80,9 +80,9 @@ class Rig:
         p = cs.SX.sym("p", sum(part.size for part in self.controller.parameters))
         added, (y, wish) = cs.SX.sym("added", self.n), _said(t)
         views = _split(self.controller.parameters, p)
-        gains = SimpleNamespace(**(vars(views.g) | {"stiffness": t.stiffness, "damping": t.damping}))
-        command = law.command(y, Reference(wish.pose, wish.velocity), views.m, gains, added)
-        stored = law.stored(y, views.m, gains)
+        gains = SimpleNamespace(**(vars(views.gains) | {"stiffness": t.stiffness, "damping": t.damping}))
+        command = law.command(y, Reference(wish.pose, wish.velocity), views.model, gains, added)
+        stored = law.stored(y, views.model, gains)
         potential = law.task.potential(stored.pose, wish.pose, t.stiffness)
         outputs = [command.tau_m, stored.energy, potential, *stored.pose, stored.dphi]
         return cs.Function("alone", [told, p, added], [cs.densify(x) for x in outputs], {"cse": True})
@@ -93,7 +93,7 @@ class Rig:
         law, (told, t) = self.controller.law, self.told.symbols("told")
         p = cs.SX.sym("p", sum(part.size for part in self.controller.parameters))
         views, rows = _split(self.controller.parameters, p), slice(0, law.task.size)
-        m, g, a, (y, wish) = views.m, views.g, views.actions, _said(t)
+        m, g, a, (y, wish) = views.model, views.gains, views.actions, _said(t)
         stored = law.stored(y, m, g)
         phi, dphi = stored.phi, stored.dphi
         M, J = law.robot.arm.mass_matrix(y.q, m), law.robot.arm.jacobian(y.q, m)[rows, :]
@@ -120,8 +120,8 @@ class Rig:
         robot, parts = self.controller.law.robot, self.controller.parameters
         shares = OFF | (actions or {})
         values = ControlParameters(
-            m=robot.nominal(),
-            g=self.gains(seed),
+            model=robot.nominal(),
+            gains=self.gains(seed),
             fallback=self.gains(seed + 1),
             tank={f"tank_{name}": value for name, value in (LEVELS | levels).items()},
             actions={f.name: np.broadcast_to(shares[f.name], f.shape) for f in action_layout(self.n)},

@@ -18,11 +18,12 @@ from passiflex.errors import RunFileError, SizeError, ValueRangeError
 from passiflex.reports import report_text
 from passiflex.reports.facts import shown_configuration
 from passiflex.reports.metrics import metrics_header
+from passiflex.runs import run_bounds
 from passiflex.runs.run import JOINT_PARAMETERS
 from passiflex.runs.run_arm import chain_of, problem_of, robot_of
 from passiflex.runs.run_attributes import KINDS
 from passiflex.runs.salvaged import salvage
-from passiflex.simulation import Run, parse_scenario, resolve, run_bounds, simulate
+from passiflex.simulation import Run, parse_scenario, resolve, simulate
 from passiflex.views import ideal_motion, marks_of
 from worlds import PLANAR
 

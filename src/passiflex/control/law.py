@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import abc
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from types import SimpleNamespace
 from typing import NamedTuple, final
 
 import casadi as cs
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from passiflex.control.gravity import AbstractGravity, RobotGravity
 from passiflex.control.inner_loop import motor_torque, shaped_damping, shaped_motion
@@ -18,6 +21,8 @@ from passiflex.control.task import AbstractTask, PoseTask
 from passiflex.layout import Field, Layout
 from passiflex.robots.flexible import FlexibleJointRobot
 from passiflex.robots.linear_algebra import gram, solve_spd
+
+Array = NDArray[np.float64]
 
 
 class OuterLoop(NamedTuple):
@@ -46,6 +51,8 @@ class AbstractLaw(abc.ABC):
     task: AbstractTask
     gravity: AbstractGravity
     has_tank: bool
+    shapes: bool
+    """Whether it gives the joints another stiffness and the motors another inertia."""
 
     @property
     @abc.abstractmethod
@@ -71,6 +78,10 @@ class AbstractLaw(abc.ABC):
         """Return the shaped motors and what they store beside the Cartesian spring."""
 
     @abc.abstractmethod
+    def posture_at_rest(self, q: Array, theta: Array, K: Array, gains: Mapping[str, ArrayLike]) -> Array:
+        """Return φ (n,) of a robot at rest, in numbers; the Cartesian spring is slack there."""
+
+    @abc.abstractmethod
     def motors(self, m: SimpleNamespace, g: SimpleNamespace) -> cs.SX:
         """Return the inertia (n,) with which the motors move, kg m²; with that of the links, what the task moves."""
 
@@ -89,6 +100,7 @@ class ImpedanceLaw(AbstractLaw):
     task: AbstractTask = PoseTask()
     gravity: AbstractGravity = RobotGravity()
     has_tank = True
+    shapes = True
 
     @cached_property
     def layout(self) -> Layout:
@@ -112,6 +124,10 @@ class ImpedanceLaw(AbstractLaw):
         motors, springs = _shaped_energies(phi, dphi, y.q, g)
         weight = self.gravity.compensation(arm, phi, K_e, m).storage
         return Stored(phi, dphi, arm.pose(phi, m), motors, springs, weight)
+
+    def posture_at_rest(self, q: Array, theta: Array, K: Array, gains: Mapping[str, ArrayLike]) -> Array:
+        """Return φ of (11)."""
+        return q + K / np.asarray(gains["shaped_stiffness"]) * (theta - q)
 
     def motors(self, m: SimpleNamespace, g: SimpleNamespace) -> cs.SX:
         """Return B_e."""

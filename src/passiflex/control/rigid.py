@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from types import SimpleNamespace
 from typing import final
 
 import casadi as cs
+from numpy.typing import ArrayLike
 
 from passiflex.control.gravity import AbstractGravity, RobotGravity
-from passiflex.control.law import AbstractLaw
+from passiflex.control.law import AbstractLaw, Array
 from passiflex.control.null_space import inverse_cartesian_inertia, null_space_contribution
 from passiflex.control.signals import Command, LawEnergy, Measurement, Reference, Stored
 from passiflex.control.task import AbstractTask, PoseTask
@@ -39,6 +41,7 @@ class RigidImpedanceLaw(AbstractLaw):
     task: AbstractTask = PoseTask()
     gravity: AbstractGravity = RobotGravity()
     has_tank = False
+    shapes = False
 
     @cached_property
     def layout(self) -> Layout:
@@ -60,6 +63,10 @@ class RigidImpedanceLaw(AbstractLaw):
         arm, q, dq = self.robot.arm, y.theta, y.dtheta
         motors, springs = _joint_energies(y, m)
         return Stored(q, dq, arm.pose(q, m), motors, springs, -arm.potential_energy(q, m))
+
+    def posture_at_rest(self, q: Array, theta: Array, K: Array, gains: Mapping[str, ArrayLike]) -> Array:
+        """Return θ: the law takes the motors for the links."""
+        return theta
 
     def motors(self, m: SimpleNamespace, g: SimpleNamespace) -> cs.SX:
         """Return B, whether the law knows of it or not."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import itertools
 import math
 from collections.abc import Mapping
 from typing import NamedTuple
@@ -13,9 +12,8 @@ from numpy.typing import NDArray
 
 from passiflex.control.tank import NO_CAP
 from passiflex.errors import ValueRangeError
-from passiflex.layout import Layout
 from passiflex.loops.motion import hold
-from passiflex.loops.sampled_loop import Parts, SampledLoop
+from passiflex.loops.sampled_loop import SampledLoop
 from passiflex.problems.altered import altered, replaced
 from passiflex.problems.problem import Event, Noise
 from passiflex.simulation import Problem
@@ -142,11 +140,7 @@ def settled(problem: Problem, plant: Mapping[str, Array], late: float, variance:
     assert own.sampling is not None
     robot = problem.law.robot
     parts = SampledLoop(s.controller).parameters
-    real = {
-        name: values
-        for part in (parts.sensors, parts.limits)
-        for name, values in part.unpack(_of_part(parts, s.numbers, part)).items()
-    }
+    real = parts.unpack("sensors", s.numbers) | parts.unpack("limits", s.numbers)
     limit = np.minimum(np.asarray(real["torque_limit"]), robot.torque_limit)
     numbers = replaced(parts, own.sampling.numbers, real | {"torque_limit": limit})
     sampling = dataclasses.replace(own.sampling, delay=late, numbers=numbers)
@@ -160,11 +154,6 @@ def settled(problem: Problem, plant: Mapping[str, Array], late: float, variance:
     dies_out = variance > 0 or bool((end <= np.maximum(FADING * middle, QUIET * limit)).all())
     near = np.abs(run["tau_m"][2 * third :]).max(axis=0) >= np.maximum(NEARLY * limit, 1.05 * np.abs(s.held))
     return dies_out and bool((end <= CALM * limit).all()) and not near.any()
-
-
-def _of_part(parts: Parts, numbers: Array, wanted: Layout) -> Array:
-    start = sum(part.size for part in itertools.takewhile(lambda part: part is not wanted, parts))
-    return numbers[start : start + wanted.size]
 
 
 def growth(problem: Problem) -> float:

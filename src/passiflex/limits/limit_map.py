@@ -10,7 +10,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from passiflex.control.law import ImpedanceLaw
 from passiflex.limits.confirmation import Confirmation, confirm
 from passiflex.limits.one_thread import on_one_thread
 from passiflex.limits.own_margin import OwnMargin, own_margin
@@ -150,7 +149,7 @@ def limit_map(
     name, period = problem.name, problem.sampling.period
     report(f"{name}: compiling")
     own = LinearLoop(problem)
-    shaped = isinstance(problem.law, ImpedanceLaw)
+    shaped = problem.law.shapes
     report(f"{name}: radii over the gains")
     grids = PICTURED if pictured else TOLD
     rates = grids.rates if shaped or pictured else RATES  # of the rigid law they are what there is to tell

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from passiflex.control.law import ImpedanceLaw
 from passiflex.errors import ValueRangeError
 from passiflex.limits.recommend import Report, recommend_gains
 from passiflex.limits.recommendation import Recommendation
@@ -43,7 +42,7 @@ def recommend_for(
     """
     problem = sampled_problem(subject, rate, delay, task=task)
     law = problem.law
-    if not isinstance(law, ImpedanceLaw):
+    if not law.shapes:
         raise ValueRangeError(
             "the rigid law has no K_e and B_e to recommend", got=problem.name, needs="law type: impedance"
         )

@@ -93,17 +93,17 @@ class ClosedLoop:
         claimed = "claimed by the law"
         return Layout(
             (
-                Field("position", (3,), "m", "end effector"),
-                Field("rotation", (3, 3), "1", "axes of the end effector"),
-                Field("desired_position", (3,), "m", "reference x_d"),
-                Field("desired_rotation", (3, 3), "1", "axes of the reference"),
+                Field("position", (3,), "m", "end effector", axes=("axis",)),
+                Field("rotation", (3, 3), "1", "axes of the end effector", axes=("axis", "column")),
+                Field("desired_position", (3,), "m", "reference x_d", axes=("axis",)),
+                Field("desired_rotation", (3, 3), "1", "axes of the reference", axes=("axis", "column")),
                 Field("phi", (n,), angle, "shaped motor coordinate of (11)"),
                 Field("dphi", (n,), speed, "its velocity"),
                 Field("tau_m", (n,), torque, "motor torque"),
                 Field("tau_a", (n,), torque, "torque through the joint, positive on the link"),
                 Field("tau_e", (n,), torque, "external joint torque"),
                 Field("tau_u", (n,), torque, "outer-loop torque"),
-                Field("wrench", (6,), "N, N m", "F_e on the end effector"),
+                Field("wrench", (6,), "N, N m", "F_e on the end effector", axes=("component",)),
                 Field("link_kinetic_energy", (), "J", "½ q̇ᵀ M q̇"),
                 Field("motor_kinetic_energy", (), "J", "½ θ̇ᵀ B θ̇"),
                 Field("joint_spring_energy", (), "J", "½ (θ−q)ᵀ K (θ−q)"),

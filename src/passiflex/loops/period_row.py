@@ -28,15 +28,15 @@ class PeriodRow:
         n, k = self.n, self.k
         return SURROUNDINGS + Layout(
             (
-                Field("desired_position", (3,), "m", "x_d"),
-                Field("desired_rotation", (3, 3), "1", "axes of x_d"),
-                Field("desired_velocity", (6,), "m/s, rad/s", "ẋ_d"),
-                Field("desired_acceleration", (6,), "m/s^2, rad/s^2", "ẍ_d"),
-                Field("desired_stiffness", (k, k), "N/m, N, N m/rad", "K_x"),
-                Field("desired_damping", (k, k), "N s/m, N s, N m s/rad", "D_x"),
-                Field("feedforward", (6,), "N, N m", "wrench that the end effector is to exert"),
-                Field("torque_noise", (n,), "N m", "of the joint torque sensors"),
-                Field("elapsed", (), "s", "since the last period that ran"),
+                Field("desired_position", (3,), "m", "x_d", axes=("axis",)),
+                Field("desired_rotation", (3, 3), "1", "axes of x_d", axes=("axis", "column")),
+                Field("desired_velocity", (6,), "m/s, rad/s", "ẋ_d", kept=False),
+                Field("desired_acceleration", (6,), "m/s^2, rad/s^2", "ẍ_d", kept=False),
+                Field("desired_stiffness", (k, k), "N/m, N, N m/rad", "K_x", kept=False),
+                Field("desired_damping", (k, k), "N s/m, N s, N m s/rad", "D_x", kept=False),
+                Field("feedforward", (6,), "N, N m", "wrench that the end effector is to exert", kept=False),
+                Field("torque_noise", (n,), "N m", "of the joint torque sensors", kept=False),
+                Field("elapsed", (), "s", "since the last period that ran", kept=False),
             )
         )
 

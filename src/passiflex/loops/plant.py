@@ -28,9 +28,9 @@ PLANT_ENERGIES = Layout(
 
 SURROUNDINGS = Layout(
     (
-        Field("F_e", (6,), "N, N m", "wrench on the end effector, world axes"),
-        Field("viscous_drag", (), "N s/m", "of the end effector's linear motion"),
-        Field("dry_drag", (), "N", "of the end effector's linear motion"),
+        Field("F_e", (6,), "N, N m", "wrench on the end effector, world axes", kept=False),
+        Field("viscous_drag", (), "N s/m", "of the end effector's linear motion", kept=False),
+        Field("dry_drag", (), "N", "of the end effector's linear motion", kept=False),
     )
 )
 

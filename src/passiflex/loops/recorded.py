@@ -1,22 +1,19 @@
-"""What one sample of a sampled loop consists of, by name: the same for a run alone and for runs in lanes."""
+"""What a run records, by name: of a sample, the same for a run alone and for runs in lanes; and all that any may."""
 
 from __future__ import annotations
 
+from functools import cache
+
+from passiflex.control.law import ImpedanceLaw
 from passiflex.layout import Field, Layout
+from passiflex.loops.closed_loop import ENERGIES, ClosedLoop
 from passiflex.loops.plant import PLANT_ENERGIES
 from passiflex.loops.sampled_loop import SampledLoop
-
-INTERNAL = (
-    "started", "read_q", "read_theta", "read_dq", "read_dtheta", "read_tau_a", "read_wrench", "last_q",
-    "last_tau_a", "last_command", "running", "given_torque", "claimed_power", "claimed_cartesian_power",
-    "variable_potential", "seen", "seen_theta", "seen_deflection", "seen_dq", "seen_ddq", "in_flight",
-    "momentum", "known_torque", "observing", "lost_time",
-    "walk", "bent", "unread_energy", "curved_energy", "withheld_energy", "joint_work", "first_q", "first_torque",
-    "slow_q", "raw_tau_a", "step_q", "step_tau_a", "step_time",
-)  # fmt: skip
-"""Memory of the controller that is of no interest to a reader, or is recorded under another name."""
-WISHED = ("desired_position", "desired_rotation")
-"""What of the row is reported."""
+from passiflex.robots.flexible import FlexibleJointRobot
+from passiflex.sampled.controller import SampledController
+from passiflex.sampled.external import MomentumObserver
+from passiflex.sampled.matched_loop import MatchedInnerLoop
+from passiflex.sampled.tanks import PortTank
 
 
 def sample_parts(loop: SampledLoop) -> dict[str, Layout]:
@@ -31,7 +28,7 @@ def sample_parts(loop: SampledLoop) -> dict[str, Layout]:
     )
     return {
         "x": Layout(state),
-        "quads": Layout(tuple(f._replace(name=f"{f.name}_energy") for f in PLANT_ENERGIES)),
+        "quads": energies(PLANT_ENERGIES),
         "controller": loop.memory,
         "command": Layout((Field("tau_m", (n,), torque, "motor torque in force"),)),
         "signals": loop.signals,
@@ -40,8 +37,17 @@ def sample_parts(loop: SampledLoop) -> dict[str, Layout]:
     }
 
 
-def reported(part: str, layout: Layout) -> Layout:
-    """Return the fields of a part that a reader gets to see."""
-    if part == "row":
-        return Layout(tuple(f for f in layout if f.name in WISHED))
-    return Layout(tuple(f for f in layout if part != "controller" or f.name not in INTERNAL))
+@cache
+def axes_of_signals() -> dict[str, tuple[str, ...]]:
+    """Return the axes of every signal that a run over time may have, after that of time."""
+    law = ImpedanceLaw(FlexibleJointRobot.load("planar2r"))
+    everything = SampledController(law, PortTank(), MomentumObserver(), MatchedInnerLoop())
+    continuous = ClosedLoop(law)
+    layouts = [*sample_parts(SampledLoop(everything)).values(), continuous.state, continuous.output_layout]
+    layouts.append(energies(ENERGIES))
+    return {f.name: f.dims for layout in layouts for f in layout.kept}
+
+
+def energies(powers: Layout) -> Layout:
+    """Return the energies that powers add up to, as a run has them."""
+    return Layout(tuple(f._replace(name=f"{f.name}_energy") for f in powers))

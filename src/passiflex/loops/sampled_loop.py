@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from types import SimpleNamespace
-from typing import NamedTuple
 
 import casadi as cs
+import numpy as np
+from numpy.typing import NDArray
 
 from passiflex.control.signals import Measurement
 from passiflex.layout import Field, Layout
+from passiflex.loops.parts import Parts
 from passiflex.loops.period_row import PeriodRow
 from passiflex.loops.plant import PLANT_ENERGIES, SURROUNDINGS, Plant
 from passiflex.loops.witness import LARGEST, Instant, Witness
@@ -18,27 +19,12 @@ from passiflex.native import Watch
 from passiflex.robots.arm import EndEffectorPose
 from passiflex.sampled.controller import SampledController
 from passiflex.sampled.motors import limit_layout, limited
+from passiflex.sampled.rest import Rest
 from passiflex.sampled.sensors import Sensors
 from passiflex.sampled.signals import ControlParameters, Wish
 
 AT_ONCE = 1e-7
 """Two instants closer than this are one [s], after millions of periods; a law claims a level when it reads."""
-
-
-class Parts(NamedTuple):
-    """The parameters of the period, in the order of the flat vector."""
-
-    plant: Layout
-    model: Layout
-    gains: Layout
-    fallback: Layout
-    tank: Layout
-    actions: Layout
-    observer: Layout
-    inner: Layout
-    errors: Layout
-    sensors: Layout
-    limits: Layout
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,8 +61,25 @@ class SampledLoop:
     def memory(self) -> Layout:
         """Return the state of `control`: the sensors', the controller's, and the torque of the motors."""
         n = self.controller.law.robot.n
-        torque = Layout((Field("given_torque", (n,), "N m", "that the motors were last told to give"),))
+        torque = Layout(
+            (
+                Field(
+                    "given_torque",
+                    (n,),
+                    "N m",
+                    "that the motors were last told to give",
+                    kept=False,
+                    acts=True,
+                ),
+            )
+        )
         return self.sensors.state + self.controller.state + torque
+
+    def start(self, at: Rest) -> NDArray[np.float64]:
+        """Return the memory at rest, flat."""
+        return self.memory.pack(
+            self.sensors.start(at) | self.controller.start(at) | {"given_torque": at.command}
+        )
 
     @cached_property
     def period(self) -> PeriodRow:
@@ -124,11 +127,13 @@ class SampledLoop:
         n, (_, _, torque) = robot.n, robot.arm.chain.joint_units
         return Layout(
             (
-                Field("position", (3,), "m", "end effector"),
-                Field("rotation", (3, 3), "1", "axes of the end effector"),
+                Field("position", (3,), "m", "end effector", axes=("axis",)),
+                Field("rotation", (3, 3), "1", "axes of the end effector", axes=("axis", "column")),
                 Field("tau_a", (n,), torque, "torque through the joint, positive on the link"),
                 Field("tau_e", (n,), torque, "external joint torque"),
-                Field("wrench", (6,), "N, N m", "F_e on the end effector, drag included"),
+                Field(
+                    "wrench", (6,), "N, N m", "F_e on the end effector, drag included", axes=("component",)
+                ),
                 Field("link_kinetic_energy", (), "J", "½ q̇ᵀ M q̇"),
                 Field("motor_kinetic_energy", (), "J", "½ θ̇ᵀ B θ̇"),
                 Field("joint_spring_energy", (), "J", "½ (θ−q)ᵀ K (θ−q)"),
@@ -146,8 +151,8 @@ class SampledLoop:
         state = cs.SX.sym("x", 4 * robot.n)
         memory, c = self.memory.symbols("c")
         row, w = self.row.symbols("row")
-        p = cs.SX.sym("p", sum(part.size for part in self.parameters))
-        views = _views(self.parameters, p)
+        p = cs.SX.sym("p", self.parameters.size)
+        views = self.parameters.view(p)
         x = self.plant.view(state)
         torques = self.plant.torques(x, w, views.plant)
         true = Measurement(x.q, x.theta, x.dq, x.dtheta, torques.tau_a, torques.wrench, torques.tau_e)
@@ -160,7 +165,7 @@ class SampledLoop:
             w.desired_damping,
             w.feedforward,
         )
-        told = ControlParameters(*(getattr(views, part) for part in Parts._fields[1:-2]))
+        told = ControlParameters(*(getattr(views, part) for part in ControlParameters._fields))
         start = self.sensors.state.size
         own = memory[start : start + self.controller.state.size]
         command, after, entry, believed = self.controller.step(y, wish, w.elapsed, c.given_torque, own, told)
@@ -205,8 +210,8 @@ class SampledLoop:
         robot, arm = self.controller.law.robot, self.controller.law.robot.arm
         state, command = cs.SX.sym("x", 4 * robot.n), cs.SX.sym("command", robot.n)
         surroundings, s = SURROUNDINGS.symbols("s")
-        p = cs.SX.sym("p", sum(part.size for part in self.parameters))
-        views, x = _views(self.parameters, p), self.plant.view(state)
+        p = cs.SX.sym("p", self.parameters.size)
+        views, x = self.parameters.view(p), self.plant.view(state)
         m = views.plant
         torques = self.plant.torques(x, s, m)
         _, powers = self.plant.rhs(state, cs.vertcat(command, surroundings), p[: self.parameters.plant.size])
@@ -237,7 +242,7 @@ class SampledLoop:
     def watch(self) -> Watch:
         """Return what the witness does at a sample and at a step; its p is that of `control`, then its own."""
         law, witness, n = self.controller.law, self.witness, self.controller.law.robot.n
-        arm, size = law.robot.arm, sum(part.size for part in self.parameters)
+        arm, size = law.robot.arm, self.parameters.size
         memory, w = witness.memory.symbols("w")
         time, command, y = (
             cs.SX.sym("time"),
@@ -247,7 +252,7 @@ class SampledLoop:
         controller, c = self.memory.symbols("c")
         signals, z = self.signals.symbols("z")
         p = cs.SX.sym("p", size + witness.parameters.size)
-        views = _views(self.parameters, p[:size])
+        views = self.parameters.view(p[:size])
         x, passed = self.plant.view(y[: 4 * n]), PLANT_ENERGIES.view(y[4 * n :])
         level = c.tank_energy if law.has_tank else -c.reference_energy  # which was lent
         claimed = ("shaped_kinetic", "cartesian_spring", "shaped_spring", "compensated")
@@ -275,11 +280,3 @@ class SampledLoop:
             cs.Function("look", seen, [cs.densify(looked)], {"cse": True}),
             cs.Function("glance", [memory, time, y, p], [cs.densify(glanced)], {"cse": True}),
         )
-
-
-def _views(parts: Parts, p: cs.SX) -> SimpleNamespace:
-    views, start = {}, 0
-    for name, part in zip(Parts._fields, parts, strict=True):
-        views[name] = part.view(p[start : start + part.size])
-        start += part.size
-    return SimpleNamespace(**views)

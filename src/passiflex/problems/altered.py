@@ -11,10 +11,10 @@ import numpy as np
 import yaml
 from numpy.typing import ArrayLike, NDArray
 
-from passiflex.control.rigid import RigidImpedanceLaw
 from passiflex.errors import NameUnknownError, ValueRangeError
 from passiflex.loops.motion import Motion, Pose, pose_at, shifted
-from passiflex.loops.sampled_loop import Parts, SampledLoop
+from passiflex.loops.parts import Parts
+from passiflex.loops.sampled_loop import SampledLoop
 from passiflex.problems.posture import posture
 from passiflex.problems.problem import Problem, Sampling
 from passiflex.sampled.controller import SampledController
@@ -188,14 +188,11 @@ def replaced(parts: Parts, numbers: Array, values: Mapping[str, ArrayLike], only
 
     `only` names the one part in which they are.
     """
-    out, start = numbers.copy(), 0
-    for name, part in zip(parts._fields, parts, strict=True):
-        if only in (None, name):
-            for field in part:
-                if field.name in values:
-                    where = part.slices[field.name]
-                    out[start + where.start : start + where.stop] = np.ravel(values[field.name])
-        start += part.size
+    out = numbers.copy()
+    for name, at in parts.slices.items():
+        own = getattr(parts, name).slices
+        for entry in own.keys() & values.keys() if only in (None, name) else ():
+            out[at][own[entry]] = np.ravel(values[entry])
     return out
 
 
@@ -226,8 +223,8 @@ def _at_rest(problem: Problem, plant: dict[str, Array]) -> Problem:
     stretch = weight / plant["joint_stiffness"]
     model, gains = law.robot.layout.unpack(problem.model), law.layout.unpack(problem.gains)
     K = model["joint_stiffness"]
-    shaped = stretch if isinstance(law, RigidImpedanceLaw) else K / gains["shaped_stiffness"] * stretch
-    home = posture(law.robot, q + shaped, model).pose
+    shaped = law.posture_at_rest(q, q + stretch, K, gains)
+    home = posture(law.robot, shaped, model).pose
     events = (
         e if e.motion is None else e._replace(motion=_rebased(e.motion, problem.home, home))
         for e in problem.events

@@ -90,27 +90,24 @@ def sampling(
         "friction_width": motors.friction_width,
     }
     parts = SampledLoop(controller).parameters
-    plant_numbers = parts.plant.pack(plant | friction)
     moved = np.diag(start.mass_matrix) + gains.get("shaped_inertia", model["motor_inertia"])
-    numbers = [
-        plant_numbers,
-        parts.model.pack(model),
-        parts.gains.pack(gains),
-        parts.fallback.pack(_fallback(control, scenario, robot, model, gains)),
-        parts.tank.pack(_tank(tank)),
-        parts.actions.pack(_actions(scenario.actions or Actions(), robot, q, moved)),
-        parts.observer.pack({"bandwidth": _pole(control.observer_bandwidth)}),
-        parts.inner.pack(
-            {
-                "period": 1 / control.rate,
-                "velocity_gain": VELOCITY_GAIN,
-                "acceleration_gain": ACCELERATION_GAIN,
-            }
-        ),
-        parts.errors.pack(_errors(control, sensors, scenario.noise, robot)),
-        parts.sensors.pack(_sensors(sensors, robot)),
-        parts.limits.pack(_limits(motors, robot)),
-    ]
+    numbers = parts.pack(
+        plant=plant | friction,
+        model=model,
+        gains=gains,
+        fallback=_fallback(control, scenario, robot, model, gains),
+        tank=_tank(tank),
+        actions=_actions(scenario.actions or Actions(), robot, q, moved),
+        observer={"bandwidth": _pole(control.observer_bandwidth)},
+        inner={
+            "period": 1 / control.rate,
+            "velocity_gain": VELOCITY_GAIN,
+            "acceleration_gain": ACCELERATION_GAIN,
+        },
+        errors=_errors(control, sensors, scenario.noise, robot),
+        sensors=_sensors(sensors, robot),
+        limits=_limits(motors, robot),
+    )
     return Sampling(
         controller=controller,
         period=1 / control.rate,
@@ -118,8 +115,8 @@ def sampling(
         jitter=control.jitter,
         missed=control.missed,
         insist=control.insist,
-        numbers=np.concatenate(numbers),
-        plant=plant_numbers,
+        numbers=numbers,
+        plant=numbers[parts.slices["plant"]],
         held=start.gravity_torque,
         gains=_gain_changes(scenario, gains),
         feedforward=tuple(

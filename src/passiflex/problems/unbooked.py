@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from passiflex.control.rigid import RigidImpedanceLaw
 from passiflex.problems.problem import Problem
 from passiflex.sampled.external import NoTorque
 
@@ -22,7 +21,7 @@ def unbooked(problem: Problem) -> str:
     The rigid law shapes the inertia of the end effector, which no storage of its own accounts for; without
     the force on it that is not even a passive wish. It measures no joint torque, so that noise is none of it.
     """
-    s, rigid = problem.sampling, isinstance(problem.law, RigidImpedanceLaw)
+    s, rigid = problem.sampling, not problem.law.shapes
     causes = []
     if rigid:
         blind = s is not None and isinstance(s.controller.external, NoTorque)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from passiflex.errors import FrozenError, RunFileError
 from passiflex.files import as_path, read_json, whole_file
-from passiflex.layout import Field, Layout
+from passiflex.layout import Layout
 from passiflex.loops.witness import Noted
 from passiflex.origin import package_version, source_commit
 from passiflex.problems.unbooked import UNKNOWN, unbooked
@@ -25,16 +25,6 @@ from passiflex.runs.run_file import FORMAT, cut_short, defects, foreign, require
 if TYPE_CHECKING:
     from passiflex.problems.problem import Problem
 
-AXES = {
-    "position": ("axis",),
-    "desired_position": ("axis",),
-    "rotation": ("axis", "column"),
-    "desired_rotation": ("axis", "column"),
-    "wrench": ("component",),
-    "governed_position": ("axis",),
-    "governed_rotation": ("axis", "column"),
-    "held_stiffness": ("task_row", "task_column"),
-}
 JOINT_PARAMETERS = ("joint_stiffness", "joint_damping", "motor_inertia")
 """Of the robot as described: with the arm's description they make it again, without its file."""
 COORDINATES = {
@@ -188,7 +178,7 @@ def assemble(
         values = layout.unpack(numbers)
         for f in layout:
             variables[f.name + suffix] = (
-                _dims(f), values[f.name], {"units": f.unit, "long_name": f.meaning},
+                ("time", *f.dims), values[f.name], {"units": f.unit, "long_name": f.meaning},
             )  # fmt: skip
     for f in noted.layout:
         about = {"units": f.unit, "long_name": f.meaning}
@@ -235,7 +225,3 @@ def _description(problem: Problem) -> str:
     plant = robot.layout.unpack(problem.plant)
     arm = replace(robot.arm.chain, tip_xyz=plant["tool_position"], tip_rotation=plant["tool_rotation"])
     return arm.to_urdf(own_names=True)
-
-
-def _dims(f: Field) -> tuple[str, ...]:
-    return ("time", *(AXES.get(f.name) or ("joint",) * len(f.shape)))

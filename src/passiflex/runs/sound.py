@@ -6,8 +6,8 @@ import numpy as np
 import xarray as xr
 
 from passiflex.loops.joint_extremes import JointExtremes
+from passiflex.loops.recorded import axes_of_signals
 from passiflex.loops.witness import Witness
-from passiflex.runs.run import AXES
 
 Dims = tuple[str, ...]
 
@@ -15,7 +15,6 @@ SIZES = {"axis": 3, "column": 3, "component": 6}
 """How long the axes of space are; the others are as long as the run and the robot have it."""
 OF_TIME = ("_energy", "_power", "_storage", "_share", "_time")
 """Ends of the names of signals that are one number at each instant."""
-OF_JOINTS = ("q", "theta", "dq", "dtheta", "tau_m", "tau_a", "tau_e")
 OF_ROBOT = ("torque_limit", "velocity_limit", "lower_position_limit", "upper_position_limit")
 NOTED = {
     f.name: ("joint",) * len(f.shape)
@@ -48,14 +47,12 @@ def _ordered(name: str, values: xr.DataArray, data: xr.Dataset) -> Dims | None:
 
 def _possible(name: str) -> tuple[Dims, ...]:
     """Return the axes that a signal of this name may have; one that is not known here may be of any usual kind."""
-    if name in AXES:
-        return (("time", *AXES[name]),)
+    if (axes := axes_of_signals().get(name)) is not None:
+        return (("time", *axes),)
     if name in NOTED:
         return (NOTED[name],)
     if name in OF_ROBOT:
         return (("joint",),)
-    if name in OF_JOINTS:
-        return (("time", "joint"),)
     return (("time",),) if name.endswith(OF_TIME) else (("time",), ("time", "joint"), ("joint",))
 
 

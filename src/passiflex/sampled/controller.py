@@ -18,6 +18,8 @@ from passiflex.sampled.external import AbstractExternalTorque, Known, TrueTorque
 from passiflex.sampled.governor import govern_pose, govern_stiffness
 from passiflex.sampled.inner_loop import AbstractInnerLoop, PlainInnerLoop
 from passiflex.sampled.measurement_bound import booked_bound, bound_state, error_layout, sure, sure_state
+from passiflex.sampled.period_state import period_start, period_state
+from passiflex.sampled.rest import Remembered, Rest
 from passiflex.sampled.signals import ControlParameters, LedgerEntry, Step, Wish
 from passiflex.sampled.tank import AbstractTank, PeriodFlows, TankEntry, added, finite, unchanged
 
@@ -65,45 +67,14 @@ class SampledController:
     def state(self) -> Layout:
         """Return what is remembered from one period to the next; energies are sums since the start."""
         n, k = self.law.robot.n, self.law.task.size
-        return (
-            Layout(
-                (
-                    Field("governed_position", (3,), "m", "x̂_d, the reference in force"),
-                    Field("governed_rotation", (3, 3), "1", "its axes"),
-                    Field("held_stiffness", (k, k), "N/m, N, N m/rad", "K_x in force"),
-                    Field("tank_energy", (), "J", "T"),
-                    Field("law_storage", (), "J", "S after the last change of the reference"),
-                    Field("variable_potential", (), "J", "U(K_x) − U(K_base)"),
-                    Field("claimed_power", (), "W", "P_D that the law claims"),
-                    Field("claimed_cartesian_power", (), "W", "its part in D_x"),
-                    Field("last_q", (n,), "rad", "measured q of the last period"),
-                    Field("last_tau_a", (n,), "N m", "measured τ_a of the last period"),
-                    Field("last_command", (n,), "N m", "τ_m of the last period"),
-                    Field("running", (), "1", "0 before the first period"),
-                    Field("latched", (), "1", "1 once the law has fallen back"),
-                    Field("measured_port_energy", (), "J", "Σ w"),
-                    Field("reference_energy", (), "J", "Σ ΔU: stored by changes of reference and stiffness"),
-                    Field("granted_energy", (), "J", "paid for changes of reference and stiffness"),
-                    Field("drawn_energy", (), "J", "taken from the tank by the port"),
-                    Field("refilled_energy", (), "J", "given to the tank"),
-                    Field("spilled_energy", (), "J", "refused by the cap"),
-                    Field("rebased_energy", (), "J", "given to T by S when the law fell back"),
-                    Field("lowest_level", (), "J", "least T so far"),
-                    Field("governed_time", (), "s", "in which the reference was held back"),
-                    Field("faults", (), "1", "periods with a measurement that was not finite"),
-                    Field(
-                        "lost_time",
-                        (),
-                        "s",
-                        "since the last measurement that was finite, if it was not the last",
-                    ),
-                )
-            )
-            + bound_state(n)
-            + sure_state(n)
-            + self.external.state(n)
-            + self.inner.state(n)
-        )
+        books = period_state(n, k) + bound_state(n) + sure_state(n)
+        return books + self.external.state(n) + self.inner.state(n)
+
+    def start(self, at: Rest) -> Remembered:
+        """Return what is remembered at rest, of each field of the state."""
+        n, k = self.law.robot.n, self.law.task.size
+        bounds = (bound_state(n) + sure_state(n)).zeros()
+        return period_start(n, k, at) | bounds | self.external.start(at) | self.inner.start(at)
 
     def step(
         self,
@@ -121,14 +92,14 @@ class SampledController:
         arm, s = self.law.robot.arm, self.state.view(state)
         ok = finite(elapsed, given, *y, *wish.pose, *wish[1:], below=LARGEST_READING)
         elapsed = s.lost_time + cs.if_else(finite(elapsed, below=LARGEST_READING), elapsed, 0)
-        y, observed = self.external.estimate(y, elapsed, Known(arm, p.m, p.observer.bandwidth), s)
-        y, seen = self.inner.see(y, given, elapsed, s, p.m, p.inner)
+        y, observed = self.external.estimate(y, elapsed, Known(arm, p.model, p.observer.bandwidth), s)
+        y, seen = self.inner.see(y, given, elapsed, s, p.model, p.inner)
         first = s.running < 1
 
         held = EndEffectorPose(s.governed_position, s.governed_rotation)
-        before = self.law.stored(y, p.m, _chosen(s.latched, p.fallback, p.g))
+        before = self.law.stored(y, p.model, _chosen(s.latched, p.fallback, p.gains))
         storage = before.energy + self._potential(before, held, s.held_stiffness)
-        variable = self._potential(before, held, s.held_stiffness - p.g.stiffness)
+        variable = self._potential(before, held, s.held_stiffness - p.gains.stiffness)
         work = cs.if_else(first, 0, cs.dot(s.last_tau_a + y.tau_a, y.q - s.last_q) / 2)
         flows = PeriodFlows(
             elapsed=elapsed,
@@ -150,8 +121,8 @@ class SampledController:
         short = settled.level + bound.lowered < p.tank.tank_trip + s.sure_measurement_bound
         overdrawn = cs.logic_and(short, s.latched < 1) if falls else cs.SX(0)
         latched = cs.fmax(s.latched, overdrawn)
-        g = _chosen(latched, p.fallback, p.g)
-        now = self.law.stored(y, p.m, g)
+        g = _chosen(latched, p.fallback, p.gains)
+        now = self.law.stored(y, p.model, g)
         held = _pose(overdrawn, now.pose, held)
         held_stiffness = cs.if_else(overdrawn, p.fallback.stiffness, s.held_stiffness)
         restored = cs.if_else(overdrawn, now.energy, storage)  # the spring is slack at the pose just read
@@ -168,7 +139,7 @@ class SampledController:
             brake = self.tank.braking(granted.entry.level, cs.dot(now.dphi, now.dphi), elapsed, p.tank)
             torque -= brake * now.dphi
         reference, memory = Reference(granted.pose, wish.velocity), self.inner.state(self.law.robot.n)
-        command = self.inner.command(self.law, y, reference, p.m, g, torque, memory.view(seen), p.inner)
+        command = self.inner.command(self.law, y, reference, p.model, g, torque, memory.view(seen), p.inner)
 
         tank = added(settled, granted.entry)
         held_back = cs.logic_or(granted.pose_share < 1, granted.stiffness_share < 1)
@@ -178,7 +149,7 @@ class SampledController:
             "held_stiffness": granted.stiffness,
             "tank_energy": tank.level,
             "law_storage": restored + granted.cost,
-            "variable_potential": self._potential(now, granted.pose, granted.stiffness - p.g.stiffness),
+            "variable_potential": self._potential(now, granted.pose, granted.stiffness - p.gains.stiffness),
             "claimed_power": command.energy.dissipated_power,
             "claimed_cartesian_power": command.energy.cartesian_damping,
             "last_q": y.q,
@@ -242,7 +213,7 @@ class SampledController:
         task, tank = self.law.task, self.tank
         share = tank.stiffness_share(level - doubt, p.tank)
         wanted = cs.if_else(
-            share < 1, p.g.stiffness + share * (wish.stiffness - p.g.stiffness), wish.stiffness
+            share < 1, p.gains.stiffness + share * (wish.stiffness - p.gains.stiffness), wish.stiffness
         )
         wanted = cs.if_else(latched, held_stiffness, wanted)
         signed = p.tank.tank_signed
@@ -274,14 +245,14 @@ class SampledController:
         """Return the torque of everything that only the tank's valve lets through (n,) N m."""
         arm, rows = self.law.robot.arm, slice(0, self.law.task.size)
         S, held, a = self.law.task.basis(granted.pose), list(self.law.task.held), p.actions
-        M, J = arm.mass_matrix(y.q, p.m), S.T @ arm.jacobian(y.q, p.m)[rows, :]
+        M, J = arm.mass_matrix(y.q, p.model), S.T @ arm.jacobian(y.q, p.model)[rows, :]
         velocity, acceleration = S.T @ wish.velocity[rows], S.T @ wish.acceleration[rows]
         follow = granted.pose_share * tracking_wrench(
             M, J, g.damping[held, held], velocity, acceleration, g.regularisation, a
         )
-        at_end = arm.jacobian(now.phi, p.m)
+        at_end = arm.jacobian(now.phi, p.model)
         J_held = S.T @ at_end[rows, :]
-        moving = M + cs.diag(self.law.motors(p.m, g))
+        moving = M + cs.diag(self.law.motors(p.model, g))
         error = S.T @ self.law.task.error(now.pose, granted.pose)
         posture = posture_spring(moving, J_held, error, now.phi, now.dphi, g.regularisation, a)
         return at_end.T @ wish.wrench + J_held.T @ follow + posture

@@ -13,6 +13,7 @@ from passiflex.control.signals import Measurement
 from passiflex.layout import Field, Layout
 from passiflex.robots.arm import SerialArm
 from passiflex.robots.linear_algebra import solve_spd
+from passiflex.sampled.rest import Remembered, Rest
 from passiflex.sampled.sensors import low_pass
 
 REGULAR = 1e-6
@@ -40,6 +41,10 @@ class AbstractExternalTorque(abc.ABC):
     @abc.abstractmethod
     def state(self, n: int) -> Layout:
         """Return what is remembered from one sample to the next."""
+
+    def start(self, at: Rest) -> Remembered:
+        """Return what is remembered at rest, of each field of the state."""
+        return self.state(at.q.size).zeros()
 
     @abc.abstractmethod
     def estimate(self, y: Measurement, elapsed: cs.SX, known: Known, s: SimpleNamespace) -> Estimate:
@@ -101,12 +106,24 @@ class MomentumObserver(AbstractExternalTorque):
         """Return the estimate, the last momentum and the last known torque."""
         return Layout(
             (
-                Field("observed_torque", (n,), "N m", "τ_e of the observer"),
-                Field("momentum", (n,), "N m s", "M q̇ at the last sample"),
-                Field("known_torque", (n,), "N m", "τ_a + Ṁq̇ − Cq̇ − ∇V at the last sample"),
-                Field("observing", (), "1", "0 before the first sample"),
+                Field("observed_torque", (n,), "N m", "τ_e of the observer", acts=True),
+                Field("momentum", (n,), "N m s", "M q̇ at the last sample", kept=False, acts=True),
+                Field(
+                    "known_torque",
+                    (n,),
+                    "N m",
+                    "τ_a + Ṁq̇ − Cq̇ − ∇V at the last sample",
+                    kept=False,
+                    acts=True,
+                ),
+                Field("observing", (), "1", "0 before the first sample", kept=False),
             )
         )
+
+    def start(self, at: Rest) -> Remembered:
+        """Return that nothing pushes."""
+        known = at.running * (at.tau_a - at.weight)
+        return self.state(at.q.size).zeros() | {"known_torque": known, "observing": at.running}
 
     def estimate(self, y: Measurement, elapsed: cs.SX, known: Known, s: SimpleNamespace) -> Estimate:
         """Return y with the observer's τ_e."""

@@ -12,6 +12,7 @@ import casadi as cs
 from passiflex.control.law import AbstractLaw
 from passiflex.control.signals import Command, Measurement, Reference
 from passiflex.layout import Field, Layout
+from passiflex.sampled.rest import Remembered, Rest
 
 
 class Seen(NamedTuple):
@@ -37,6 +38,10 @@ class AbstractInnerLoop(abc.ABC):
     @abc.abstractmethod
     def state(self, n: int) -> Layout:
         """Return what is remembered from one period to the next."""
+
+    def start(self, at: Rest) -> Remembered:
+        """Return what is remembered at rest, of each field of the state."""
+        return self.state(at.q.size).zeros()
 
     @abc.abstractmethod
     def see(

@@ -14,6 +14,7 @@ from types import SimpleNamespace
 from typing import NamedTuple, final
 
 import casadi as cs
+import numpy as np
 
 from passiflex.control.inner_loop import shaped_damping
 from passiflex.control.law import AbstractLaw, ImpedanceLaw
@@ -21,6 +22,7 @@ from passiflex.control.signals import Command, LawEnergy, Measurement, Reference
 from passiflex.layout import Field, Layout
 from passiflex.robots.linear_algebra import solve_spd
 from passiflex.sampled.inner_loop import AbstractInnerLoop, Seen
+from passiflex.sampled.rest import Remembered, Rest
 
 SLOW = 1e-2
 """Least frequency [1/s] that is told from critical damping; over a period the difference is below 1e-8."""
@@ -67,14 +69,30 @@ class MatchedInnerLoop(AbstractInnerLoop):
         """Return the last readings, the estimates, and the torques that are on their way."""
         return Layout(
             (
-                Field("seen", (), "1", "0 before the first period"),
-                Field("seen_theta", (n,), "rad", "θ of the last period"),
-                Field("seen_deflection", (n,), "rad", "δ for the link velocity"),
-                Field("seen_dq", (n,), "rad/s", "q̇"),
-                Field("seen_ddq", (n,), "rad/s^2", "slow acceleration"),
-                Field("in_flight", (self.late + 1, n), "N m", "given torques, the oldest first"),
+                Field("seen", (), "1", "0 before the first period", kept=False),
+                Field("seen_theta", (n,), "rad", "θ of the last period", kept=False, acts=True),
+                Field("seen_deflection", (n,), "rad", "δ for the link velocity", kept=False, acts=True),
+                Field("seen_dq", (n,), "rad/s", "q̇", kept=False, acts=True),
+                Field("seen_ddq", (n,), "rad/s^2", "slow acceleration", kept=False, acts=True),
+                Field(
+                    "in_flight",
+                    (self.late + 1, n),
+                    "N m",
+                    "given torques, the oldest first",
+                    kept=False,
+                    acts=True,
+                ),
             )
         )
+
+    def start(self, at: Rest) -> Remembered:
+        """Return the readings of a joint at rest, and the same torque in every period."""
+        return self.state(at.q.size).zeros() | {
+            "seen": at.running,
+            "seen_theta": at.running * at.theta,
+            "seen_deflection": at.running * at.tau_a / at.stiffness,
+            "in_flight": at.running * np.tile(at.command, (self.late + 1, 1)),
+        }
 
     def see(
         self,

@@ -85,19 +85,27 @@ def bound_state(n: int) -> Layout:
             Field("measurement_bound", (), "J", "E, most that Σ w may be short of the energy given so far"),
             Field("read_time", (), "s", "when the sensors were last read"),
             Field("charged_energy", (), "J", "its part for the mean credit of noise that lasts"),
-            Field("walk", (), "J^2", "variance of what noise and encoders make of Σ w"),
-            Field("bent", (), "J^2", "variance of the bends, as if they were random"),
-            Field("unread_energy", (), "J", "Σ of the bends in gaps"),
-            Field("curved_energy", (), "J", "what parabolas add to the trapezoids, without the gaps"),
-            Field("withheld_energy", (), "J", "Σ w with τ_a as before the sensors' low-pass, less Σ w"),
-            Field("joint_work", (n,), "J", "Σ w of each joint, with τ_a as before the low-pass"),
-            Field("first_q", (n,), "rad", "q of the first period"),
-            Field("first_torque", (), "N m", "Σ|τ_a| of the first period"),
-            Field("slow_q", (n,), "rad", "q, low-passed over the time that noise lasts"),
-            Field("raw_tau_a", (n,), "N m", "τ_a of the last period as before the low-pass"),
-            Field("step_q", (n,), "rad", "q of the last period less that of the one before"),
-            Field("step_tau_a", (n,), "N m", "the same of τ_a as before the low-pass"),
-            Field("step_time", (), "s", "time between the two"),
+            Field("walk", (), "J^2", "variance of what noise and encoders make of Σ w", kept=False),
+            Field("bent", (), "J^2", "variance of the bends, as if they were random", kept=False),
+            Field("unread_energy", (), "J", "Σ of the bends in gaps", kept=False),
+            Field(
+                "curved_energy", (), "J", "what parabolas add to the trapezoids, without the gaps", kept=False
+            ),
+            Field(
+                "withheld_energy",
+                (),
+                "J",
+                "Σ w with τ_a as before the sensors' low-pass, less Σ w",
+                kept=False,
+            ),
+            Field("joint_work", (n,), "J", "Σ w of each joint, with τ_a as before the low-pass", kept=False),
+            Field("first_q", (n,), "rad", "q of the first period", kept=False),
+            Field("first_torque", (), "N m", "Σ|τ_a| of the first period", kept=False),
+            Field("slow_q", (n,), "rad", "q, low-passed over the time that noise lasts", kept=False),
+            Field("raw_tau_a", (n,), "N m", "τ_a of the last period as before the low-pass", kept=False),
+            Field("step_q", (n,), "rad", "q of the last period less that of the one before", kept=False),
+            Field("step_tau_a", (n,), "N m", "the same of τ_a as before the low-pass", kept=False),
+            Field("step_time", (), "s", "time between the two", kept=False),
             Field("torque", (), "N m", "Σ|τ_a| of the last period"),
         )
     )
@@ -107,7 +115,7 @@ def sure_state(n: int) -> Layout:
     """Return what is remembered of the last period in which the level was sure: above the floor, with E subtracted."""
     known = {f.name: f for f in bound_state(n)}
     names = ("measurement_bound", "walk", "withheld_energy", "joint_work", "torque")
-    fields = [known[name]._replace(name=f"sure_{name}") for name in names]
+    fields = [known[name]._replace(name=f"sure_{name}", kept=True) for name in names]
     return Layout((*fields, Field("sure_q", (n,), "rad", "q")))
 
 

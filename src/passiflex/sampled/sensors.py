@@ -10,6 +10,7 @@ import casadi as cs
 
 from passiflex.control.signals import Measurement
 from passiflex.layout import Field, Layout
+from passiflex.sampled.rest import Remembered, Rest
 
 UNFILTERED = 1e9
 """A bandwidth [rad/s] that stands for none."""
@@ -76,15 +77,24 @@ class Sensors:
         n = self.n
         return Layout(
             (
-                Field("started", (), "1", "0 before the first sample"),
-                Field("read_q", (n,), "rad", "last reading of q"),
-                Field("read_theta", (n,), "rad", "last reading of θ"),
-                Field("read_dq", (n,), "rad/s", "low-passed difference of q"),
-                Field("read_dtheta", (n,), "rad/s", "low-passed difference of θ"),
-                Field("read_tau_a", (n,), "N m", "low-passed τ_a"),
-                Field("read_wrench", (6,), "N, N m", "low-passed F_e"),
+                Field("started", (), "1", "0 before the first sample", kept=False),
+                Field("read_q", (n,), "rad", "last reading of q", kept=False, acts=True),
+                Field("read_theta", (n,), "rad", "last reading of θ", kept=False, acts=True),
+                Field("read_dq", (n,), "rad/s", "low-passed difference of q", kept=False, acts=True),
+                Field("read_dtheta", (n,), "rad/s", "low-passed difference of θ", kept=False, acts=True),
+                Field("read_tau_a", (n,), "N m", "low-passed τ_a", kept=False, acts=True),
+                Field("read_wrench", (6,), "N, N m", "low-passed F_e", kept=False, acts=True),
             )
         )
+
+    def start(self, at: Rest) -> Remembered:
+        """Return what they remember at rest."""
+        return self.state.zeros() | {
+            "started": at.running,
+            "read_q": at.running * at.q,
+            "read_theta": at.running * at.theta,
+            "read_tau_a": at.running * at.tau_a,
+        }
 
     def read(
         self, truth: Measurement, torque_noise: cs.SX, elapsed: cs.SX, s: SimpleNamespace, g: SimpleNamespace

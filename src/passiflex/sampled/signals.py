@@ -75,8 +75,8 @@ class ControlParameters(NamedTuple):
 
     Attributes
     ----------
-    m: The law's model, `robot.layout`.
-    g: The law's gains, `law.layout`; stiffness and damping of the period come with the wish.
+    model: The law's model, `robot.layout`.
+    gains: The law's gains, `law.layout`; stiffness and damping of the period come with the wish.
     fallback: The same layout, in force once the law has fallen back.
     tank: `AbstractTank.layout`.
     actions: `action_layout`.
@@ -85,8 +85,8 @@ class ControlParameters(NamedTuple):
     errors: `error_layout`, what the sensors may get wrong.
     """
 
-    m: SimpleNamespace
-    g: SimpleNamespace
+    model: SimpleNamespace
+    gains: SimpleNamespace
     fallback: SimpleNamespace
     tank: SimpleNamespace
     actions: SimpleNamespace

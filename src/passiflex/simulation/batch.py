@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from passiflex.errors import NameUnknownError, SimulationError
 from passiflex.loops.compiled import CompiledSampledLoop, compiled_sampled_loop, structure
-from passiflex.loops.recorded import reported, sample_parts
+from passiflex.loops.recorded import sample_parts
 from passiflex.loops.sampled_loop import SampledLoop
 from passiflex.loops.witness import Noted
 from passiflex.native import Change, LaneFunctions, LaneInputs, LaneLoop, find_compiler
@@ -244,7 +244,7 @@ def _columns(
     where = {}
     for part, layout in sample_parts(loop).items():
         begin = lanes.instant[part].start
-        for f in reported(part, layout):
+        for f in layout.kept:
             own = layout.slices[f.name]
             where[f.name] = np.arange(begin + own.start, begin + own.stop), f.shape
     columns: list[NDArray[np.int64]] = [np.zeros(0, np.int64)]  # of no signals
@@ -286,7 +286,7 @@ def simulate_in_lane(problem: Problem) -> Run:
     `simulate` gives the same but for rounding, which a sensor's resolution or an unstable loop makes visible.
     """
     loop = _compiled(problem).loop
-    layouts = [reported(part, layout) for part, layout in sample_parts(loop).items()]
+    layouts = [layout.kept for layout in sample_parts(loop).values()]
     (recording,) = simulate_batch([problem], [f.name for layout in layouts for f in layout])
     rows = [
         Rows(layout, np.hstack([recording[f.name].reshape(len(recording.time), f.size) for f in layout]))

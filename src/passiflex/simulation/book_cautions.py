@@ -7,7 +7,6 @@ import dataclasses
 import numpy as np
 from numpy.typing import NDArray
 
-from passiflex.control.law import ImpedanceLaw
 from passiflex.loops.sampled_loop import SampledLoop
 from passiflex.problems.altered import altered, replaced
 from passiflex.problems.problem import Problem
@@ -44,7 +43,7 @@ def _noise(problem: Problem) -> tuple[str, ...]:
 def _lighter(problem: Problem, power: float) -> str:
     """Return a shaped inertia that at least halves the credit, found by trying; or what else there is."""
     law, model = problem.law, problem.law.robot.layout.unpack(problem.model)
-    if isinstance(law, ImpedanceLaw):
+    if law.shapes:
         own = law.layout.unpack(problem.gains)["shaped_inertia"] / model["motor_inertia"]
         for ratio in (r for r in HEAVIER if (r > own).all()):
             changed = altered(problem, gains={"shaped_inertia": ratio * model["motor_inertia"]})
@@ -58,8 +57,7 @@ def _offset(problem: Problem) -> tuple[str, ...]:
     s = problem.sampling
     assert s is not None
     parts = SampledLoop(s.controller).parameters
-    start = sum(part.size for part in parts[: parts._fields.index("errors")])
-    offset = parts.errors.unpack(s.numbers[start : start + parts.errors.size])["torque_offset"]
+    offset = parts.unpack("errors", s.numbers)["torque_offset"]
     given, floor = float(offset.sum()) * REACH, problem.tank.floor
     if given <= floor:
         return ()

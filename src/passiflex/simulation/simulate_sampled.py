@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
 from passiflex.errors import SimulationError
 from passiflex.loops.compiled import CompiledSampledLoop, compiled_sampled_loop
 from passiflex.loops.plant import SURROUNDINGS
-from passiflex.loops.recorded import reported, sample_parts
+from passiflex.loops.recorded import sample_parts
 from passiflex.loops.witness import Noted
 from passiflex.native import LoopState, NativeFunction, fastest_pole
 from passiflex.native.stability import STABILITY_LIMIT
@@ -19,6 +17,7 @@ from passiflex.runs.run import Rows, Run, assemble
 from passiflex.simulation.rows import NOW
 from passiflex.simulation.rows import Rows as PeriodRows
 from passiflex.stability.admissible import require_stable
+from passiflex.stability.loop_at_rest import at_rest, standing
 from passiflex.stability.noise_credit import charged
 
 Array = NDArray[np.float64]
@@ -53,21 +52,13 @@ def simulate_unchecked(problem: Problem) -> Run:
 
 def start(problem: Problem, compiled: CompiledSampledLoop) -> LoopState:
     """Return the loop at rest at its start, with the reference where the end effector is."""
-    s, loop = problem.sampling, compiled.loop
+    s = problem.sampling
     assert s is not None
-    stiffness = problem.law.layout.unpack(problem.gains)["stiffness"]
-    known: dict[str, Any] = {
-        "governed_position": problem.home.position,
-        "governed_rotation": problem.home.rotation,
-        "held_stiffness": stiffness,
-        "tank_energy": problem.tank.initial,
-        "lowest_level": problem.tank.initial,
-        "last_command": s.held,
-        "given_torque": s.held,
-    }
-    memory = loop.memory.pack({f.name: known.get(f.name, np.zeros(f.shape)) for f in loop.memory})
+    at, gains = standing(problem), problem.law.layout.unpack(problem.gains)
+    rest = at_rest(problem, at, problem.home, gains["stiffness"], problem.tank.initial, running=0.0)
     zero = np.zeros(problem.law.robot.n)
-    return compiled.held.start(np.concatenate([problem.q, problem.theta, zero, zero]), memory, s.held)
+    x = np.concatenate([problem.q, problem.theta, zero, zero])
+    return compiled.held.start(x, compiled.loop.start(rest), s.held)
 
 
 def longest_step(problem: Problem, plant: NativeFunction) -> float:
@@ -152,10 +143,8 @@ def _assemble(
     everything = [*seen[:-1], truth, rows]
     count = _whole_rows(everything) if failure else len(x)
     recorded = []
-    for (name, layout), numbers in zip(parts.items(), everything, strict=True):
-        kept = reported(name, layout)
-        columns = np.hstack([np.arange(layout.size)[layout.slices[f.name]] for f in kept])
-        recorded.append(Rows(kept, numbers[:count, columns]))
+    for layout, numbers in zip(parts.values(), everything, strict=True):
+        recorded.append(Rows(layout.kept, numbers[:count, layout.columns(lambda f: f.kept)]))
     every = round(problem.output_interval / s.period)
     time: Array = np.arange(count, dtype=np.float64) * (s.period * every)
     return assemble(problem, time, recorded, [], failure, noted)

@@ -9,7 +9,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from passiflex.control.law import ImpedanceLaw
 from passiflex.errors import UnstableLoopError
 from passiflex.problems.altered import altered
 from passiflex.problems.problem import Problem
@@ -127,7 +126,7 @@ def check(problem: Problem, rate: float | None = None, delay: float | None = Non
     found, loop = judge(changed), LinearLoop(changed)
     period, late = loop.s.period, changed.sampling.delay
     K_ratio, B_ratio = _ratios(changed)
-    shaped, nan = isinstance(changed.law, ImpedanceLaw), math.nan
+    shaped, nan = changed.law.shapes, math.nan
     return Admissible(
         judgement=found,
         advice=None if found.stable else advise(changed, found),

@@ -150,5 +150,4 @@ def _bare_flange(t: Trial) -> bool:
 
 
 def _actions(loop: LinearLoop) -> np.ndarray:
-    before = sum(part.size for part in loop.parts[: loop.parts._fields.index("actions")])
-    return loop.s.numbers[before : before + loop.parts.actions.size]
+    return loop.s.numbers[loop.parts.slices["actions"]]

@@ -31,12 +31,6 @@ IDEAL = {
     "coulomb_friction": 0.0,
 }
 """What has no linear approximation is left out, and constants."""
-REMEMBERED = (
-    "read_q", "read_theta", "read_dq", "read_dtheta", "read_tau_a", "read_wrench",
-    "observed_torque", "momentum", "known_torque",
-    "seen_theta", "seen_deflection", "seen_dq", "seen_ddq", "in_flight", "given_torque",
-)  # fmt: skip
-"""The memory that may act back on the command; the tank does not while it is full."""
 KEPT = 8
 """Derivatives that are remembered."""
 
@@ -77,8 +71,7 @@ class LawSlope:
     def torque(self, at: Standing) -> Array:
         """Return ∂τ_a/∂x (n, 4n) of a robot, as these sensors have it before their noise."""
         plant = self.parts.plant.unpack(at.plant)
-        before = sum(part.size for part in self.parts[: self.parts._fields.index("sensors")])
-        sensors = self.parts.sensors.unpack(self.numbers[before : before + self.parts.sensors.size])
+        sensors = self.parts.unpack("sensors", self.numbers)
         seen = 1 + sensors["torque_scale"]
         K, D = np.diag(seen * plant["joint_stiffness"]), np.diag(seen * plant["joint_damping"])
         return np.hstack([-K, K, -D, D])
@@ -134,7 +127,7 @@ def differences(x: Array) -> tuple[Array, Array]:
 def _acting(loop: SampledLoop) -> NDArray[np.intp]:
     """Return which numbers of the memory act on a command, this period's or, by way of others, a later one's."""
     memory, control, n = loop.memory, loop.control, loop.controller.law.robot.n
-    named = np.hstack([np.arange(memory.size)[memory.slices[f.name]] for f in memory if f.name in REMEMBERED])
+    named = memory.columns(lambda f: f.acts)  # the tank does not while it is full
     kept, told = (
         np.array(cs.DM(control.jac_sparsity(out, 1), 1.0).full(), dtype=bool)[:, named] for out in (0, 1)
     )

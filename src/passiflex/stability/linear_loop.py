@@ -176,9 +176,7 @@ class LinearLoop:
 
     def fallback(self) -> dict[str, Array]:
         """Return the gains of the law that takes over when the tank is overdrawn."""
-        before = self.parts[: self.parts._fields.index("fallback")]
-        start = sum(part.size for part in before)
-        return self.parts.fallback.unpack(self.s.numbers[start : start + self.parts.fallback.size])
+        return self.parts.unpack("fallback", self.s.numbers)
 
     def beside(self, at: Standing) -> LinearLoop:
         """Return the loop of another robot at the same posture, which makes its law's derivative from this one's.

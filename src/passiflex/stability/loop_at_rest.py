@@ -8,12 +8,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from passiflex.control.rigid import RigidImpedanceLaw
-from passiflex.layout import Layout
+from passiflex.loops.motion import Pose
 from passiflex.loops.plant import Plant
 from passiflex.loops.sampled_loop import SampledLoop
 from passiflex.problems.posture import Posture, posture
 from passiflex.problems.problem import Problem
+from passiflex.sampled.rest import Rest
 
 Array = NDArray[np.float64]
 
@@ -72,36 +72,10 @@ def loop_at_rest(
 ) -> AtRest:
     """Return what a period finds and leaves unchanged, with the gains in place of the problem's and a full tank."""
     p, at = problem, at or standing(problem)
-    model, plant = loop.parameters.model.unpack(p.model), loop.parameters.plant.unpack(at.plant)
-    K = model["joint_stiffness"]
-    stretch = at.theta - at.q
-    shaped = (
-        at.theta
-        if isinstance(p.law, RigidImpedanceLaw)
-        else at.q + K / np.asarray(gains["shaped_stiffness"]) * stretch
-    )
+    model = loop.parameters.model.unpack(p.model)
+    shaped = p.law.posture_at_rest(at.q, at.theta, model["joint_stiffness"], gains)
     home = posture(p.law.robot, shaped, model).pose
-    tau_a = plant["joint_stiffness"] * stretch
-    weight = posture(p.law.robot, at.q, model).gravity_torque
-    known: dict[str, Any] = {
-        "started": 1.0,
-        "read_q": at.q,
-        "read_theta": at.theta,
-        "read_tau_a": tau_a,
-        "governed_position": home.position,
-        "governed_rotation": home.rotation,
-        "held_stiffness": gains["stiffness"],
-        "tank_energy": BRIMFUL,
-        "last_q": at.q,
-        "last_tau_a": tau_a,
-        "known_torque": tau_a - weight,
-        "observing": 1.0,
-        "seen": 1.0,
-        "seen_theta": at.theta,
-        "seen_deflection": tau_a / K,
-        "last_command": at.held,
-        "given_torque": at.held,
-    }
+    rest = at_rest(p, at, home, gains["stiffness"], BRIMFUL, running=1.0)
     row: dict[str, Any] = {
         "desired_position": home.position,
         "desired_rotation": home.rotation,
@@ -109,9 +83,25 @@ def loop_at_rest(
         "desired_damping": gains["damping"],
         "elapsed": period,
     }
-    known |= {f.name: np.tile(at.held, (f.shape[0], 1)) for f in loop.memory if f.name == "in_flight"}
-    return AtRest(_packed(loop.memory, known), _packed(loop.row, row), shaped)
+    return AtRest(loop.start(rest), loop.row.pack(loop.row.zeros() | row), shaped)
 
 
-def _packed(layout: Layout, known: Mapping[str, Any]) -> Array:
-    return layout.pack({f.name: known.get(f.name, np.zeros(f.shape)) for f in layout})
+def at_rest(
+    problem: Problem, at: Standing, home: Pose, stiffness: ArrayLike, level: float, *, running: float
+) -> Rest:
+    """Return what the parts of a loop are told of where it rests: its reference at `home`, its tank at a level [J]."""
+    robot = problem.law.robot
+    model, plant = robot.layout.unpack(problem.model), Plant(robot).parameters.unpack(at.plant)
+    return Rest(
+        running=running,
+        q=at.q,
+        theta=at.theta,
+        tau_a=plant["joint_stiffness"] * (at.theta - at.q),
+        weight=posture(robot, at.q, model).gravity_torque,
+        command=at.held,
+        stiffness=model["joint_stiffness"],
+        position=home.position,
+        rotation=home.rotation,
+        cartesian_stiffness=np.asarray(stiffness),
+        level=level,
+    )

@@ -7,7 +7,6 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from passiflex.control.law import ImpedanceLaw
 from passiflex.problems.problem import Problem
 from passiflex.stability.judgement import Case, Judgement, fallback_cases, law_cases
 from passiflex.stability.linear_loop import LinearLoop
@@ -27,7 +26,7 @@ class Trial:
         self.loop = LinearLoop(problem)
         cases = fallback_cases(self.loop) if found.part == "fallback" else law_cases(self.loop)
         self.cases: list[Case] = list(cases)
-        self.shapes = isinstance(problem.law, ImpedanceLaw)
+        self.shapes = problem.law.shapes
         model = problem.law.robot.layout.unpack(problem.model)
         self.own_inertia, self.own_stiffness = model["motor_inertia"], model["joint_stiffness"]
 

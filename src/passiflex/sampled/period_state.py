@@ -1,0 +1,64 @@
+"""What the controller itself remembers from one period to the next: what is in force, what was read, and the books."""
+
+from __future__ import annotations
+
+from passiflex.layout import Field, Layout
+from passiflex.sampled.rest import Remembered, Rest
+
+
+def period_state(n: int, k: int) -> Layout:
+    """Return the fields; energies are sums since the start."""
+    return Layout(
+        (
+            Field("governed_position", (3,), "m", "x̂_d, the reference in force", axes=("axis",)),
+            Field("governed_rotation", (3, 3), "1", "its axes", axes=("axis", "column")),
+            Field(
+                "held_stiffness",
+                (k, k),
+                "N/m, N, N m/rad",
+                "K_x in force",
+                axes=("task_row", "task_column"),
+            ),
+            Field("tank_energy", (), "J", "T"),
+            Field("law_storage", (), "J", "S after the last change of the reference"),
+            Field("variable_potential", (), "J", "U(K_x) − U(K_base)", kept=False),
+            Field("claimed_power", (), "W", "P_D that the law claims", kept=False),
+            Field("claimed_cartesian_power", (), "W", "its part in D_x", kept=False),
+            Field("last_q", (n,), "rad", "measured q of the last period", kept=False),
+            Field("last_tau_a", (n,), "N m", "measured τ_a of the last period", kept=False),
+            Field("last_command", (n,), "N m", "τ_m of the last period", kept=False),
+            Field("running", (), "1", "0 before the first period", kept=False),
+            Field("latched", (), "1", "1 once the law has fallen back"),
+            Field("measured_port_energy", (), "J", "Σ w"),
+            Field("reference_energy", (), "J", "Σ ΔU: stored by changes of reference and stiffness"),
+            Field("granted_energy", (), "J", "paid for changes of reference and stiffness"),
+            Field("drawn_energy", (), "J", "taken from the tank by the port"),
+            Field("refilled_energy", (), "J", "given to the tank"),
+            Field("spilled_energy", (), "J", "refused by the cap"),
+            Field("rebased_energy", (), "J", "given to T by S when the law fell back"),
+            Field("lowest_level", (), "J", "least T so far"),
+            Field("governed_time", (), "s", "in which the reference was held back"),
+            Field("faults", (), "1", "periods with a measurement that was not finite"),
+            Field(
+                "lost_time",
+                (),
+                "s",
+                "since the last measurement that was finite, if it was not the last",
+                kept=False,
+            ),
+        )
+    )
+
+
+def period_start(n: int, k: int, at: Rest) -> Remembered:
+    """Return their values at rest."""
+    return period_state(n, k).zeros() | {
+        "governed_position": at.position,
+        "governed_rotation": at.rotation,
+        "held_stiffness": at.cartesian_stiffness,
+        "tank_energy": at.level,
+        "lowest_level": at.level,
+        "last_q": at.running * at.q,
+        "last_tau_a": at.running * at.tau_a,
+        "last_command": at.command,
+    }
