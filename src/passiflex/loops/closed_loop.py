@@ -14,15 +14,13 @@ from passiflex.control.signals import Command, Measurement
 from passiflex.control.tank import EnergyTank
 from passiflex.layout import Field, Layout
 from passiflex.loops.motion import MOTION, reference_at
+from passiflex.loops.plant import PORTS, Plant
 from passiflex.loops.witness import Instant, Witness
 from passiflex.robots.flexible import RobotState
 
 ENERGIES = Layout(
     (
-        Field("external", (), "J", "∫ τ_eᵀ q̇: given to the robot by its surroundings"),
-        Field("motor", (), "J", "∫ τ_mᵀ θ̇: given to the motors by the law"),
-        Field("joint", (), "J", "∫ τ_aᵀ q̇: given to the links through the joints"),
-        Field("joint_loss", (), "J", "∫ (θ̇ − q̇)ᵀ D (θ̇ − q̇): lost in the real joints"),
+        *PORTS,
         Field("joint_damping", (), "J", "claimed by the law: lost in D_e"),
         Field("cartesian_damping", (), "J", "claimed by the law: lost in D_x"),
         Field("null_space_damping", (), "J", "claimed by the law: lost in D_ns"),
@@ -55,19 +53,18 @@ class ClosedLoop:
     tank: EnergyTank = EnergyTank()
 
     @cached_property
+    def plant(self) -> Plant:
+        """Return the plant, which nothing but a wrench touches."""
+        return Plant(self.law.robot, ())
+
+    @cached_property
     def state(self) -> Layout:
         """Return the state."""
-        n, (angle, speed, _) = self.law.robot.n, self.law.robot.arm.chain.joint_units
-        return Layout(
-            (
-                Field("q", (n,), angle, "link position"),
-                Field("theta", (n,), angle, "motor position"),
-                Field("dq", (n,), speed, "link velocity"),
-                Field("dtheta", (n,), speed, "motor velocity"),
-                Field("tank_energy", (), "J", "T"),
-                Field("clock", (), "s", "s, the reference's own time since its last event"),
-            )
+        own = (
+            Field("tank_energy", (), "J", "T"),
+            Field("clock", (), "s", "s, the reference's own time since its last event"),
         )
+        return self.plant.state + Layout(own)
 
     @cached_property
     def inputs(self) -> Layout:
@@ -83,8 +80,7 @@ class ClosedLoop:
     @cached_property
     def parameters(self) -> tuple[Layout, Layout, Layout, Layout]:
         """Return the layouts of plant, law's model, gains and tank, in this order."""
-        robot = self.law.robot.layout
-        return robot, robot, self.law.layout, self.tank.layout
+        return self.plant.parameters, self.law.robot.layout, self.law.layout, self.tank.layout
 
     @cached_property
     def output_layout(self) -> Layout:
@@ -134,70 +130,56 @@ class ClosedLoop:
     @cached_property
     def _signals(self) -> _Signals:
         x, u, plant, model, gains, tank = self._views()
-        robot, arm = self.law.robot, self.law.robot.arm
+        arm = self.law.robot.arm
         state = RobotState(x.q, x.theta, x.dq, x.dtheta)
         valve = self.tank.valve(x.tank_energy, tank) if self.law.has_tank else cs.SX(1)
         reference = reference_at(x.clock, valve, u)
 
-        tau_a = robot.joint_torque(state, plant)
-        tau_e = arm.jacobian(x.q, plant).T @ u.F_e
-        measurement = Measurement(x.q, x.theta, x.dq, x.dtheta, tau_a + u.torque_noise, u.F_e, tau_e)
+        true = self.plant.true(state, u, plant)
+        noisy = true["tau_a"] + u.torque_noise
+        measurement = Measurement(x.q, x.theta, x.dq, x.dtheta, noisy, u.F_e, true["tau_e"])
         command: Command = self.law.command(measurement, reference, model, gains)
         claim = command.energy
-        flow = self.tank.flow(x.tank_energy, claim.dissipated_power, claim.reference_power, tank)
-        ddq, ddtheta, _ = robot.acceleration(state, command.tau_m, tau_e, plant)
+        tank_flow = self.tank.flow(x.tank_energy, claim.dissipated_power, claim.reference_power, tank)
+        flow = self.plant.flow(state, command.tau_m, u, plant)
 
-        stretch = x.dtheta - x.dq
         powers = ENERGIES.stack(
             {
-                "external": cs.dot(tau_e, x.dq),
-                "motor": cs.dot(command.tau_m, x.dtheta),
-                "joint": cs.dot(tau_a, x.dq),
-                "joint_loss": cs.dot(stretch, plant.joint_damping * stretch),
+                **flow.powers,
                 "joint_damping": claim.joint_damping,
                 "cartesian_damping": claim.cartesian_damping,
                 "null_space_damping": claim.null_space_damping,
                 "reference": claim.reference_power,
-                "drawn": flow.drawn if self.law.has_tank else 0,
-                "spilled": flow.spilled if self.law.has_tank else claim.dissipated_power,
+                "drawn": tank_flow.drawn if self.law.has_tank else 0,
+                "spilled": tank_flow.spilled if self.law.has_tank else claim.dissipated_power,
             }
         )
         derivative = self.state.stack(
             {
                 "q": x.dq,
                 "theta": x.dtheta,
-                "dq": ddq,
-                "dtheta": ddtheta,
-                "tank_energy": flow.rate if self.law.has_tank else 0,
+                "dq": flow.ddq,
+                "dtheta": flow.ddtheta,
+                "tank_energy": tank_flow.rate if self.law.has_tank else 0,
                 "clock": valve,
             }
         )
-        M = arm.mass_matrix(x.q, plant)
-        pose = arm.pose(x.q, plant)
         outputs = cs.vertcat(
             Layout(self.output_layout.fields[: -len(ENERGIES.fields)]).stack(
                 {
-                    "position": pose.position,
-                    "rotation": pose.rotation,
+                    **true,
                     "desired_position": reference.pose.position,
                     "desired_rotation": reference.pose.rotation,
                     "phi": command.phi,
                     "dphi": command.dphi,
                     "tau_m": command.tau_m,
-                    "tau_a": tau_a,
-                    "tau_e": tau_e,
                     "tau_u": command.tau_u,
-                    "wrench": u.F_e,
-                    "link_kinetic_energy": cs.dot(x.dq, M @ x.dq) / 2,
-                    "motor_kinetic_energy": cs.dot(x.dtheta, plant.motor_inertia * x.dtheta) / 2,
-                    "joint_spring_energy": cs.dot(x.theta - x.q, plant.joint_stiffness * (x.theta - x.q)) / 2,
-                    "potential_energy": arm.potential_energy(x.q, plant),
                     "compensated_energy": arm.potential_energy(x.q, model),
                     "shaped_kinetic_energy": claim.motor_kinetic,
                     "shaped_spring_energy": claim.joint_spring,
                     "cartesian_spring_energy": claim.cartesian_spring,
                     "gravity_storage": claim.gravity_storage,
-                    "fill": flow.fill,
+                    "fill": tank_flow.fill,
                     "valve": valve,
                 }
             ),

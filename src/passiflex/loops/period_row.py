@@ -9,24 +9,24 @@ import casadi as cs
 
 from passiflex.layout import Field, Layout
 from passiflex.loops.motion import MOTION, reference_at
-from passiflex.loops.plant import SURROUNDINGS
 
 
 @dataclass(frozen=True)
 class PeriodRow:
-    """The row of a loop with n joints and k directions of its task.
+    """The row of a loop with n joints, k directions of its task, and these surroundings.
 
     `told` holds what stays from one event to the next, `drawn` what is new in every period.
     """
 
     n: int
     k: int
+    surroundings: Layout
 
     @cached_property
     def layout(self) -> Layout:
         """Return the row; the surroundings come first."""
         n, k = self.n, self.k
-        return SURROUNDINGS + Layout(
+        return self.surroundings + Layout(
             (
                 Field("desired_position", (3,), "m", "x_d", axes=("axis",)),
                 Field("desired_rotation", (3, 3), "1", "axes of x_d", axes=("axis", "column")),
@@ -54,7 +54,7 @@ class PeriodRow:
             Field("change_to", (), "s", "when it has ended"),
             Field("feedforward", (6,), "N, N m", "wrench that the end effector is to exert"),
         )
-        return SURROUNDINGS + MOTION + Layout(own)
+        return self.surroundings + MOTION + Layout(own)
 
     @cached_property
     def drawn(self) -> Layout:
@@ -76,7 +76,7 @@ class PeriodRow:
         position, rotation, velocity, acceleration = known(cs.fmax(time - c.began, 0), told)
         s = cs.fmin(cs.fmax((time - c.change_from) / (c.change_to - c.change_from), 0), 1)
         blend = s**3 * (10 - 15 * s + 6 * s**2)
-        values = {f.name: getattr(c, f.name) for f in SURROUNDINGS} | {
+        values = {f.name: getattr(c, f.name) for f in self.surroundings} | {
             "desired_position": position,
             "desired_rotation": rotation,
             "desired_velocity": velocity,

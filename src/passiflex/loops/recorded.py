@@ -7,7 +7,6 @@ from functools import cache
 from passiflex.control.law import ImpedanceLaw
 from passiflex.layout import Field, Layout
 from passiflex.loops.closed_loop import ENERGIES, ClosedLoop
-from passiflex.loops.plant import PLANT_ENERGIES
 from passiflex.loops.sampled_loop import SampledLoop
 from passiflex.robots.flexible import FlexibleJointRobot
 from passiflex.sampled.controller import SampledController
@@ -19,16 +18,10 @@ from passiflex.sampled.tanks import PortTank
 def sample_parts(loop: SampledLoop) -> dict[str, Layout]:
     """Return the parts of one sample, in their order, by the names of `LaneLoop.instant`."""
     robot = loop.controller.law.robot
-    n, (angle, speed, torque) = robot.n, robot.arm.chain.joint_units
-    state = (
-        Field("q", (n,), angle, "link position"),
-        Field("theta", (n,), angle, "motor position"),
-        Field("dq", (n,), speed, "link velocity"),
-        Field("dtheta", (n,), speed, "motor velocity"),
-    )
+    n, (_, _, torque) = robot.n, robot.arm.chain.joint_units
     return {
-        "x": Layout(state),
-        "quads": energies(PLANT_ENERGIES),
+        "x": loop.plant.state,
+        "quads": energies(loop.plant.energies),
         "controller": loop.memory,
         "command": Layout((Field("tau_m", (n,), torque, "motor torque in force"),)),
         "signals": loop.signals,

@@ -13,7 +13,7 @@ from passiflex.control.signals import Measurement
 from passiflex.layout import Field, Layout
 from passiflex.loops.parts import Parts
 from passiflex.loops.period_row import PeriodRow
-from passiflex.loops.plant import PLANT_ENERGIES, SURROUNDINGS, Plant
+from passiflex.loops.plant import Plant
 from passiflex.loops.witness import LARGEST, Instant, Witness
 from passiflex.native import Watch
 from passiflex.robots.arm import EndEffectorPose
@@ -84,7 +84,8 @@ class SampledLoop:
     @cached_property
     def period(self) -> PeriodRow:
         """Return how the row of a period comes about."""
-        return PeriodRow(self.controller.law.robot.n, self.controller.law.task.size)
+        law = self.controller.law
+        return PeriodRow(law.robot.n, law.task.size, self.plant.surroundings)
 
     @property
     def row(self) -> Layout:
@@ -123,26 +124,9 @@ class SampledLoop:
     @cached_property
     def truth(self) -> Layout:
         """Return what `outputs` says of one instant."""
-        robot = self.controller.law.robot
-        n, (_, _, torque) = robot.n, robot.arm.chain.joint_units
-        return Layout(
-            (
-                Field("position", (3,), "m", "end effector", axes=("axis",)),
-                Field("rotation", (3, 3), "1", "axes of the end effector", axes=("axis", "column")),
-                Field("tau_a", (n,), torque, "torque through the joint, positive on the link"),
-                Field("tau_e", (n,), torque, "external joint torque"),
-                Field(
-                    "wrench", (6,), "N, N m", "F_e on the end effector, drag included", axes=("component",)
-                ),
-                Field("link_kinetic_energy", (), "J", "½ q̇ᵀ M q̇"),
-                Field("motor_kinetic_energy", (), "J", "½ θ̇ᵀ B θ̇"),
-                Field("joint_spring_energy", (), "J", "½ (θ−q)ᵀ K (θ−q)"),
-                Field("potential_energy", (), "J", "V(q)"),
-                Field("carried_energy", (), "J", "V̂(q) of the law's model, where the links really are"),
-            )
-        ) + Layout(
-            tuple(Field(f"{f.name}_power", (), "W", f"rate of {f.name}_energy") for f in PLANT_ENERGIES)
-        )
+        carried = Field("carried_energy", (), "J", "V̂(q) of the law's model, where the links really are")
+        powers = (Field(f"{f.name}_power", (), "W", f"rate of {f.name}_energy") for f in self.plant.energies)
+        return self.plant.truth + Layout((carried, *powers))
 
     @cached_property
     def control(self) -> cs.Function:
@@ -154,8 +138,9 @@ class SampledLoop:
         p = cs.SX.sym("p", self.parameters.size)
         views = self.parameters.view(p)
         x = self.plant.view(state)
-        torques = self.plant.torques(x, w, views.plant)
-        true = Measurement(x.q, x.theta, x.dq, x.dtheta, torques.tau_a, torques.wrench, torques.tau_e)
+        wrench, tau_a = self.plant.wrench(x, w, views.plant), robot.joint_torque(x, views.plant)
+        tau_e = robot.arm.jacobian(x.q, views.plant).T @ wrench
+        true = Measurement(x.q, x.theta, x.dq, x.dtheta, tau_a, wrench, tau_e)
         y, read = self.sensors.read(true, w.torque_noise, w.elapsed, c, views.sensors)
         wish = Wish(
             EndEffectorPose(w.desired_position, w.desired_rotation),
@@ -207,31 +192,18 @@ class SampledLoop:
     @cached_property
     def outputs(self) -> cs.Function:
         """Return (x, command, surroundings, p) → `truth`, with p as for `control`."""
-        robot, arm = self.controller.law.robot, self.controller.law.robot.arm
+        robot = self.controller.law.robot
         state, command = cs.SX.sym("x", 4 * robot.n), cs.SX.sym("command", robot.n)
-        surroundings, s = SURROUNDINGS.symbols("s")
+        surroundings, s = self.plant.surroundings.symbols("s")
         p = cs.SX.sym("p", self.parameters.size)
         views, x = self.parameters.view(p), self.plant.view(state)
-        m = views.plant
-        torques = self.plant.torques(x, s, m)
-        _, powers = self.plant.rhs(state, cs.vertcat(command, surroundings), p[: self.parameters.plant.size])
-        pose, stretch = arm.pose(x.q, m), x.theta - x.q
-        values = {
-            "position": pose.position,
-            "rotation": pose.rotation,
-            "tau_a": torques.tau_a,
-            "tau_e": torques.tau_e,
-            "wrench": torques.wrench,
-            "link_kinetic_energy": cs.dot(x.dq, arm.mass_matrix(x.q, m) @ x.dq) / 2,
-            "motor_kinetic_energy": cs.dot(x.dtheta, m.motor_inertia * x.dtheta) / 2,
-            "joint_spring_energy": cs.dot(stretch, m.joint_stiffness * stretch) / 2,
-            "potential_energy": arm.potential_energy(x.q, m),
-            "carried_energy": arm.potential_energy(x.q, views.model),
+        powers = self.plant.flow(x, command, s, views.plant).powers
+        true = self.plant.true(x, s, views.plant) | {
+            "carried_energy": robot.arm.potential_energy(x.q, views.model),
+            **{f"{name}_power": power for name, power in powers.items()},
         }
-        known = Layout(self.truth.fields[: len(values)]).stack(values)
-        return cs.Function(
-            "truth", [state, command, surroundings, p], [cs.densify(cs.vertcat(known, powers))], {"cse": True}
-        )
+        told = [state, command, surroundings, p]
+        return cs.Function("truth", told, [cs.densify(self.truth.stack(true))], {"cse": True})
 
     @cached_property
     def witness(self) -> Witness:
@@ -247,13 +219,13 @@ class SampledLoop:
         time, command, y = (
             cs.SX.sym("time"),
             cs.SX.sym("command", n),
-            cs.SX.sym("y", 4 * n + PLANT_ENERGIES.size),
+            cs.SX.sym("y", 4 * n + self.plant.energies.size),
         )
         controller, c = self.memory.symbols("c")
         signals, z = self.signals.symbols("z")
         p = cs.SX.sym("p", size + witness.parameters.size)
         views = self.parameters.view(p[:size])
-        x, passed = self.plant.view(y[: 4 * n]), PLANT_ENERGIES.view(y[4 * n :])
+        x, passed = self.plant.view(y[: 4 * n]), self.plant.energies.view(y[4 * n :])
         level = c.tank_energy if law.has_tank else -c.reference_energy  # which was lent
         claimed = ("shaped_kinetic", "cartesian_spring", "shaped_spring", "compensated")
         carried = arm.potential_energy(x.q, views.model)

@@ -13,8 +13,9 @@ import numpy as np
 from passiflex.layout import Field, Layout
 from passiflex.robots.bodies import about_origin
 from passiflex.robots.chain import SerialChain
-from passiflex.robots.joint_frames import Inertia
+from passiflex.robots.joint_frames import Inertia, Wrench
 from passiflex.robots.recursions import Placed, Recursions
+from passiflex.robots.vectors import cross, plus
 
 
 class EndEffectorPose(NamedTuple):
@@ -22,6 +23,20 @@ class EndEffectorPose(NamedTuple):
 
     position: cs.SX
     rotation: cs.SX
+
+
+class TipVelocity(NamedTuple):
+    """Velocity [m/s] and spin [rad/s] of the end effector, in the axes of the last joint, (3,) each."""
+
+    velocity: cs.SX
+    spin: cs.SX
+
+
+class TipWrench(NamedTuple):
+    """Force [N] and moment [N m] on the end effector, in the axes of the last joint, (3,) each."""
+
+    force: cs.SX
+    moment: cs.SX
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,9 +98,39 @@ class SerialArm:
         """Return M(q) (n, n) kg m², link side only."""
         return self._recursions.mass_matrix(self._bodies(m), q)
 
-    def bias_torque(self, q: cs.SX, dq: cs.SX, m: SimpleNamespace) -> cs.SX:
-        """Return C(q, q̇) q̇ + ∇V(q) (n,) N m: what keeps the arm at constant velocity."""
-        return self._recursions.newton_euler(self._bodies(m), q, dq, m.gravity)
+    def bias_torque(self, q: cs.SX, dq: cs.SX, m: SimpleNamespace, pushed: TipWrench | None = None) -> cs.SX:
+        """Return C(q, q̇) q̇ + ∇V(q) (n,) N m: what keeps the arm at constant velocity.
+
+        With a wrench that pushes the end effector it is less by Jᵀ F, at half of what J takes.
+        """
+        wrench = None
+        if pushed is not None:
+            force, point = cs.vertsplit(pushed.force), cs.vertsplit(self._tip(m))
+            wrench = Wrench(force, plus(cs.vertsplit(pushed.moment), cross(point, force)))
+        return self._recursions.newton_euler(self._bodies(m), q, dq, m.gravity, pushed=wrench)
+
+    def tip_velocity(self, q: cs.SX, dq: cs.SX, m: SimpleNamespace) -> TipVelocity:
+        """Return how the end effector moves, in the axes of the last joint."""
+        *_, (speed, spin) = self._recursions.velocities(q, dq)
+        at_tip = plus(speed, cross(spin, cs.vertsplit(self._tip(m))))
+        return TipVelocity(cs.vertcat(*at_tip), cs.vertcat(*spin))
+
+    def in_tip_axes(self, q: cs.SX, v: cs.SX) -> cs.SX:
+        """Return a vector of world axes in the axes of the last joint (3,)."""
+        return cs.vertcat(*self._recursions.inward(q, cs.vertsplit(v)))
+
+    def in_world_axes(self, q: cs.SX, v: cs.SX) -> cs.SX:
+        """Return a vector in the axes of the last joint in world axes (3,)."""
+        return cs.vertcat(*self._recursions.outward(q, cs.vertsplit(v)))
+
+    def _tip(self, m: SimpleNamespace) -> cs.SX:
+        """Return the end effector in the frame of the last joint (3,) [m]."""
+        return self._link @ m.tool_position
+
+    @cached_property
+    def _link(self) -> cs.SX:
+        """Return the axes of the last link in those of its joint, as columns."""
+        return cs.sparsify(cs.DM(self._recursions.joints[-1].link))
 
     def coriolis_torque(self, q: cs.SX, dq: cs.SX, m: SimpleNamespace) -> cs.SX:
         """Return C(q, q̇) q̇ (n,) N m."""
@@ -109,9 +154,7 @@ class SerialArm:
 
     def _pose(self, last: Placed, m: SimpleNamespace) -> EndEffectorPose:
         """Return the end-effector frame from that of the last joint."""
-        link = cs.horzcat(*(cs.vertcat(*axis) for axis in last.axes)) @ cs.sparsify(
-            cs.DM(self._recursions.joints[-1].link)
-        )
+        link = cs.horzcat(*(cs.vertcat(*axis) for axis in last.axes)) @ self._link
         return EndEffectorPose(cs.vertcat(*last.origin) + link @ m.tool_position, link @ m.tool_rotation)
 
     def jacobian(self, q: cs.SX, m: SimpleNamespace) -> cs.SX:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from passiflex.errors import SizeError, ValueRangeError
 from passiflex.layout import Field, Layout
-from passiflex.robots.arm import SerialArm
+from passiflex.robots.arm import SerialArm, TipWrench
 from passiflex.robots.catalogue import RobotDescription, read_description
 from passiflex.robots.linear_algebra import solve_spd
 
@@ -118,6 +118,13 @@ class FlexibleJointRobot:
     def joint_torque(self, x: RobotState, m: SimpleNamespace) -> cs.SX:
         """Return τ_a = K (θ − q) + D (θ̇ − q̇) [N m], the last line of (2)."""
         return m.joint_stiffness * (x.theta - x.q) + m.joint_damping * (x.dtheta - x.dq)
+
+    def pushed(self, x: RobotState, tau_m: cs.SX, at_tip: TipWrench, m: SimpleNamespace) -> Acceleration:
+        """Return q̈, θ̈ of (2) under the motor torque τ_m [N m] and a wrench on the end effector."""
+        tau_a, arm = self.joint_torque(x, m), self.arm
+        resisting = arm.bias_torque(x.q, x.dq, m, at_tip)
+        ddq = solve_spd(arm.mass_matrix(x.q, m), tau_a - resisting)
+        return Acceleration(ddq, (tau_m - tau_a) / m.motor_inertia, tau_a)
 
     def acceleration(self, x: RobotState, tau_m: cs.SX, tau_e: cs.SX, m: SimpleNamespace) -> Acceleration:
         """Return q̈, θ̈ of (2) under the motor torque τ_m and the external joint torque τ_e [N m]."""

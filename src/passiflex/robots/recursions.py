@@ -54,13 +54,21 @@ class Recursions:
         return tuple(out)
 
     def newton_euler(
-        self, bodies: Sequence[Inertia], q: cs.SX, dq: cs.SX, gravity: cs.SX, ddq: cs.SX | None = None
+        self,
+        bodies: Sequence[Inertia],
+        q: cs.SX,
+        dq: cs.SX,
+        gravity: cs.SX,
+        *,
+        ddq: cs.SX | None = None,
+        pushed: Wrench | None = None,
     ) -> cs.SX:
-        """Return M q̈ + C q̇ + ∇V (n,) [N m], without the first part if no q̈ is given.
+        """Return M q̈ + C q̇ + ∇V − τ_e (n,) [N m], without the first or the last part if nothing is given for it.
 
         Parameters
         ----------
         gravity: Acceleration of free fall, world axes (3,) [m/s²].
+        pushed: On the last link from outside, at the origin of its joint and in the axes of that.
         """
         spin, turning, falling = zero(), zero(), [-g for g in cs.vertsplit(gravity)]
         wrenches, frames = [], self.moved(q)
@@ -75,6 +83,8 @@ class Recursions:
                 spin = [spin[0], spin[1], spin[2] + rate]
             wrenches.append(_inertial(body, _rates(spin, turning), falling))
         torque, carried = [cs.SX(0)] * len(frames), Wrench(zero(), zero())
+        if pushed is not None:
+            carried = Wrench([-f for f in pushed.force], [-m for m in pushed.moment])
         for i in reversed(range(len(frames))):
             carried = Wrench(*(plus(a, b) for a, b in zip(wrenches[i], carried, strict=True)))
             torque[i] = carried.force[2] if self.joints[i].slides else carried.moment[2]
@@ -96,16 +106,33 @@ class Recursions:
 
     def kinetic_energy(self, bodies: Sequence[Inertia], q: cs.SX, dq: cs.SX) -> cs.SX:
         """Return ½ q̇ᵀ M(q) q̇ [J] from the velocity of each link: a quarter of what M takes."""
-        spin, speed, energy = zero(), zero(), cs.SX(0)
-        for i, (frame, body) in enumerate(zip(self.moved(q), bodies, strict=True)):
-            speed = frame.inward(plus(speed, cross(spin, frame.origin)))
-            spin = frame.inward(spin)
-            driven = speed if self.joints[i].slides else spin
-            driven[2] += dq[i]
+        energy = cs.SX(0)
+        for (speed, spin), body in zip(self.velocities(q, dq), bodies, strict=True):
             (x, y, z), (xx, xy, xz, yy, yz, zz) = spin, body.tensor
             energy += body.mass * dot(speed, speed) / 2 + dot(speed, cross(spin, body.moment))
             energy += (x * x * xx + y * y * yy + z * z * zz) / 2 + x * y * xy + x * z * xz + y * z * yz
         return energy
+
+    def velocities(self, q: cs.SX, dq: cs.SX) -> Iterator[tuple[Vector, Vector]]:
+        """Yield linear and angular velocity of each joint's frame as it has moved, at its origin and in its axes."""
+        speed, spin = zero(), zero()
+        for i, frame in enumerate(self.moved(q)):
+            speed, spin = frame.inward(plus(speed, cross(spin, frame.origin))), frame.inward(spin)
+            driven = speed if self.joints[i].slides else spin
+            driven[2] += dq[i]
+            yield speed, spin
+
+    def inward(self, q: cs.SX, v: Vector) -> Vector:
+        """Return a vector of world axes in the axes of the last joint."""
+        for frame in self.moved(q):
+            v = frame.inward(v)
+        return v
+
+    def outward(self, q: cs.SX, v: Vector) -> Vector:
+        """Return a vector in the axes of the last joint in world axes."""
+        for frame in reversed(self.moved(q)):
+            v = frame.outward(v)
+        return v
 
     def potential_energy(self, bodies: Sequence[Inertia], q: cs.SX, gravity: cs.SX) -> cs.SX:
         """Return V(q) = −Σ mᵢ gᵀ rᵢ(q) [J], zero with all mass at the base's origin."""

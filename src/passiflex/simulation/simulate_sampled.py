@@ -7,7 +7,6 @@ from numpy.typing import NDArray
 
 from passiflex.errors import SimulationError
 from passiflex.loops.compiled import CompiledSampledLoop, compiled_sampled_loop
-from passiflex.loops.plant import SURROUNDINGS
 from passiflex.loops.recorded import sample_parts
 from passiflex.loops.witness import Noted
 from passiflex.native import LoopState, NativeFunction, fastest_pole
@@ -138,7 +137,7 @@ def _assemble(
     s, parts = problem.sampling, sample_parts(compiled.loop)
     assert s is not None
     x, _, _, command, _, rows = seen
-    felt = slice(0, SURROUNDINGS.size)
+    felt = slice(0, compiled.loop.plant.surroundings.size)
     truth = np.asarray(compiled.outputs.map(x, command, rows[:, felt], s.numbers), dtype=float)
     everything = [*seen[:-1], truth, rows]
     count = _whole_rows(everything) if failure else len(x)

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from passiflex.errors import ValueRangeError
 from passiflex.loops.compiled import compiled_sampled_loop, interpreted_sampled_loop
-from passiflex.loops.plant import SURROUNDINGS
 from passiflex.problems.altered import replaced
 from passiflex.problems.posture import held_jacobian
 from passiflex.problems.problem import Problem
@@ -224,7 +223,9 @@ class LinearLoop:
         points, steps = zip(*(differences(x) for x in where), strict=True)
         rows = np.vstack(points)
         numbers = np.repeat([self._smooth(at) for at in others], len(points[0]), axis=0)
-        u = np.hstack([rows[:, self.x.size :], np.zeros((len(rows), SURROUNDINGS.size))])
+        u = np.hstack(
+            [rows[:, self.x.size :], np.zeros((len(rows), self.compiled.loop.plant.surroundings.size))]
+        )
         values = self.compiled.plant.map(rows[:, : self.x.size], u, numbers)[0]
         split = values.reshape(len(others), 2, len(steps[0]), -1)
         change = (split[:, 0] - split[:, 1]) / (2 * np.array(steps))[:, :, None]
