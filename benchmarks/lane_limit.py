@@ -43,7 +43,7 @@ def period_of(problem: Problem) -> Period:
     """Return the period of a problem; what is true is asked for at recorded samples only."""
     s = problem.sampling
     assert s is not None
-    steps = int(np.ceil(s.period / longest_step(problem, compiled_sampled_loop(s.controller).plant)))
+    steps = int(np.ceil(s.period / longest_step(problem, compiled_sampled_loop(s.loop).plant)))
     every = round(problem.output_interval / s.period)
     return Period(
         parts_of(problem), {"plant": 4.0 * steps, "control": 1.0, "row": 1.0, "truth": 1.0 / every}, s.period

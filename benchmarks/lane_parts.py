@@ -59,7 +59,7 @@ def parts_of(problem: Problem) -> list[Part]:
     """Return the functions of a sampled loop, at a point where the robot moves and the joints are stretched."""
     s = problem.sampling
     assert s is not None
-    compiled = compiled_sampled_loop(s.controller)
+    compiled = compiled_sampled_loop(s.loop)
     loop, rng = compiled.loop, np.random.default_rng(0)
     state = start(problem, compiled)
     row, _ = Rows(problem, loop.period, compiled.row).take(0, 1)
@@ -168,7 +168,7 @@ def native_seconds(problem: Problem, periods: int) -> float:
     """Return the time of one period of the compiled loop in all lanes [s], without what Python does around it."""
     s, lanes = problem.sampling, lane_loop(problem)
     assert s is not None
-    compiled = compiled_sampled_loop(s.controller)
+    compiled = compiled_sampled_loop(s.loop)
     row = compiled.loop.period
     drawn, timing = Chance(problem, row).take(0, periods)
     told = [Change(o.first, lane, o.numbers) for o in orders(problem, row)[:1] for lane in range(lanes.width)]

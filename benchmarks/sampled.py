@@ -26,7 +26,7 @@ ASKED = 0.8
 
 def compiled_of(problem: Problem) -> CompiledSampledLoop:
     assert problem.sampling is not None
-    return compiled_sampled_loop(problem.sampling.controller)
+    return compiled_sampled_loop(problem.sampling.loop)
 
 
 def in_machine(problem: Problem, seconds: float) -> None:

@@ -10,7 +10,6 @@ import yaml
 
 from passiflex.errors import NameUnknownError, PassiflexError, SizeError, ValueRangeError
 from passiflex.loops.motion import pose_at
-from passiflex.loops.sampled_loop import SampledLoop
 from passiflex.problems.altered import MOST_PERIODS, altered, at_rate
 from passiflex.problems.posture import posture
 from passiflex.sampled.matched_loop import MatchedInnerLoop
@@ -85,7 +84,7 @@ def test_what_is_given_is_in_force_and_the_rest_stays() -> None:
     assert (after.sampling.period, after.sampling.delay) == (5e-4, 1.5e-3)
     assert after.sampling.controller.inner == MatchedInnerLoop(3)
     assert before.sampling.controller.inner == MatchedInnerLoop(1)
-    parts = SampledLoop(after.sampling.controller).parameters
+    parts = after.sampling.loop.parameters
     assert parts.unpack("inner", after.sampling.numbers)["period"] == 5e-4
     ours, theirs = (p.law.layout.unpack(p.gains) for p in (after, before))
     np.testing.assert_array_equal(ours["stiffness"], 90 * np.eye(3))

@@ -144,7 +144,7 @@ def test_each_takes_steps_of_its_own_length(planar: Problem) -> None:
         for k in (200e3, 5e3, 80e3, 4e3, 40e3, 6e3)
     ]
     assert planar.sampling is not None
-    plant = compiled_sampled_loop(planar.sampling.controller).plant
+    plant = compiled_sampled_loop(planar.sampling.loop).plant
     steps = [int(np.ceil(PERIOD / longest_step(problem, plant))) for problem in fleet]
     assert len(set(steps)) >= 3
     keep = ["q", "dq", "theta", "tank_energy", "joint_spring_energy"]

@@ -66,7 +66,7 @@ def with_steps(problem: Problem, count: int, monkeypatch: pytest.MonkeyPatch) ->
     """Return the run with `count` steps of the plant in each period."""
     usual = simulate_sampled.RESOLVED
     assert problem.sampling is not None
-    plant = compiled_sampled_loop(problem.sampling.controller).plant
+    plant = compiled_sampled_loop(problem.sampling.loop).plant
     longest = simulate_sampled.longest_step(problem, plant)
     with monkeypatch.context() as m:
         m.setattr(simulate_sampled, "RESOLVED", usual * PERIOD / count / longest * (1 + 1e-9))

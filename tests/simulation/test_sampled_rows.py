@@ -32,7 +32,7 @@ def told(*pieces: int, **changes: Any) -> tuple[np.ndarray, np.ndarray, np.ndarr
     """Return the periods' noise, timing with the time since the last one that ran, and rows; made in such pieces."""
     problem = resolve(world(**NOISE | changes))
     assert problem.sampling is not None
-    compiled = compiled_sampled_loop(problem.sampling.controller)
+    compiled = compiled_sampled_loop(problem.sampling.loop)
     rows, first = Rows(problem, compiled.loop.period, compiled.row), 0
     said, timing, at = [], [], compiled.loop.row.slices
     for count in pieces:
@@ -133,7 +133,7 @@ def where() -> dict[str, slice]:
     """Return where each thing is said."""
     problem = resolve(world())
     assert problem.sampling is not None
-    return compiled_sampled_loop(problem.sampling.controller).loop.row.slices
+    return compiled_sampled_loop(problem.sampling.loop).loop.row.slices
 
 
 def test_a_sampled_run_has_the_units_of_its_joints() -> None:

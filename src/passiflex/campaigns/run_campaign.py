@@ -33,7 +33,7 @@ from passiflex.pieces.manifest import FolderError, load_manifest
 from passiflex.pieces.run_pieces import Progress, run_pieces
 from passiflex.pieces.store import Store, open_store
 from passiflex.pieces.stored_rows import read_blocks, read_rows
-from passiflex.simulation import Run, resolve
+from passiflex.simulation import Problem, Run, resolve
 from passiflex.simulation.batch import lane_loop
 from passiflex.stability.admissible import require_stable
 from passiflex.texts.yaml_tree import read_back
@@ -212,8 +212,16 @@ def _ready(campaign: Campaign) -> str:
     if base.sampling is not None:
         require_stable(base)
         if find_compiler() is not None:  # without one the samples run one by one
-            lane_loop(base)
+            lane_loop(_first(campaign) or base)
     return robot_digest(campaign)
+
+
+def _first(campaign: Campaign) -> Problem | None:
+    """Return the first sample, whose motors may rub where those of the base do not; None if it is impossible."""
+    try:
+        return resolve(sample_scenario(campaign, 0))
+    except PassiflexError:
+        return None
 
 
 def _identity(campaign: Campaign) -> str:

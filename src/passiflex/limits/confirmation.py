@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from passiflex.control.tank import NO_CAP
 from passiflex.errors import ValueRangeError
 from passiflex.loops.motion import hold
-from passiflex.loops.sampled_loop import SampledLoop
 from passiflex.problems.altered import altered, replaced
 from passiflex.problems.problem import Event, Noise
 from passiflex.simulation import Problem
@@ -95,7 +94,7 @@ def disturbed(problem: Problem, periods: int = PERIODS) -> Problem:
     s = problem.sampling
     if s is None:
         raise ValueRangeError("the problem has no control rate", got=problem.name, needs="a sampled one")
-    parts = SampledLoop(s.controller).parameters
+    parts = s.loop.parameters
     endless = {"tank_cap": NO_CAP, "tank_power": NO_CAP, "tank_trip": -NO_CAP}
     numbers = replaced(parts, s.numbers, IDEAL | endless)
     sampling = dataclasses.replace(
@@ -139,7 +138,7 @@ def settled(problem: Problem, plant: Mapping[str, Array], late: float, variance:
     assert s is not None
     assert own.sampling is not None
     robot = problem.law.robot
-    parts = SampledLoop(s.controller).parameters
+    parts = s.loop.parameters
     real = parts.unpack("sensors", s.numbers) | parts.unpack("limits", s.numbers)
     limit = np.minimum(np.asarray(real["torque_limit"]), robot.torque_limit)
     numbers = replaced(parts, own.sampling.numbers, real | {"torque_limit": limit})

@@ -11,6 +11,7 @@ from passiflex.control.gravity import AbstractGravity
 from passiflex.control.law import AbstractLaw
 from passiflex.control.task import AbstractTask
 from passiflex.loops.closed_loop import ClosedLoop
+from passiflex.loops.plant import Elements
 from passiflex.loops.sampled_loop import SampledLoop
 from passiflex.native import (
     DRIVER,
@@ -80,11 +81,10 @@ class CompiledSampledLoop:
     row: NativeFunction
 
 
-def compiled_sampled_loop(controller: SampledController) -> CompiledSampledLoop:
-    """Return the compiled sampled loop of a controller; from the process, the cache on disk, or compiled now."""
-    key = structure(controller)
+def compiled_sampled_loop(loop: SampledLoop) -> CompiledSampledLoop:
+    """Return the compiled functions of a loop; from the process, the cache on disk, or compiled now."""
+    key = structure(loop)
     if key not in _built_sampled:
-        loop = SampledLoop(controller)
         functions = [loop.plant.rhs, loop.control, loop.outputs, loop.period.function]
         library = compile_functions([*functions, *loop.watch], driver=HELD_LOOP_DRIVER)
         native = [NativeFunction(f, library) for f in functions]
@@ -93,23 +93,27 @@ def compiled_sampled_loop(controller: SampledController) -> CompiledSampledLoop:
     return _built_sampled[key]
 
 
-@lru_cache(maxsize=8)
-def interpreted_sampled_loop(controller: SampledController) -> CompiledSampledLoop:
+def interpreted_sampled_loop(loop: SampledLoop) -> CompiledSampledLoop:
     """Return the same without compiling anything: for a few evaluations of a loop that nobody runs yet."""
-    if structure(controller) in _built_sampled:
-        return compiled_sampled_loop(controller)
-    loop = SampledLoop(controller)
+    if structure(loop) in _built_sampled:
+        return compiled_sampled_loop(loop)
+    return _interpreted(loop.controller, loop.elements)
+
+
+@lru_cache(maxsize=8)
+def _interpreted(controller: SampledController, elements: Elements) -> CompiledSampledLoop:
+    loop = SampledLoop(controller, elements)
     functions = [loop.plant.rhs, loop.control, loop.outputs, loop.period.function]
     held = HeldLoop(loop.plant.rhs, loop.control, None)
     return CompiledSampledLoop(loop, held, *(NativeFunction(f) for f in functions))
 
 
-def structure(controller: SampledController) -> tuple[object, ...]:
-    """Return what the code of a sampled loop depends on; controllers that agree in it share compiled code."""
-    law = controller.law
+def structure(loop: SampledLoop) -> tuple[object, ...]:
+    """Return what the code of a sampled loop depends on; loops that agree in it share compiled code."""
+    controller, law = loop.controller, loop.controller.law
     return (
-        _urdf(law.robot.arm), type(law), law.task, law.gravity,
-        type(controller.tank), controller.external, controller.inner,
+        _urdf(law.robot.arm), type(law), law.task, law.gravity, type(controller.tank), controller.external,
+        controller.inner, controller.actions, loop.elements,
     )  # fmt: skip
 
 

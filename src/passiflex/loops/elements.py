@@ -70,7 +70,10 @@ class AbstractElement(abc.ABC):
     ----------
     booked: Under which name a run has what it lost; empty if that is part of what the surroundings gave.
     meaning: What that is, in words.
+    acts: False leaves its arithmetic out, where all its numbers are 0; its numbers stay where they are.
     """
+
+    acts: bool
 
     booked: ClassVar[str] = ""
     meaning: ClassVar[str] = ""
@@ -93,6 +96,7 @@ class AbstractElement(abc.ABC):
 class MotorFriction(AbstractElement):
     """Coulomb and viscous friction of the motors, against θ̇."""
 
+    acts: bool = True
     booked: ClassVar[str] = "friction"
     meaning: ClassVar[str] = "lost in the motors' friction"
 
@@ -106,6 +110,8 @@ class MotorFriction(AbstractElement):
 
     def act(self, at: Touch, s: SimpleNamespace, m: SimpleNamespace) -> Effect:
         """Return the friction torque."""
+        if not self.acts:
+            return nothing(at.x.q.numel())
         rubbing = friction(at.x.dtheta, m.coulomb_friction, m.viscous_friction, m.friction_width)
         return nothing(rubbing.numel())._replace(motor=-rubbing, lost=cs.dot(rubbing, at.x.dtheta))
 
@@ -114,6 +120,8 @@ class MotorFriction(AbstractElement):
 @dataclass(frozen=True)
 class Drag(AbstractElement):
     """A drag against the linear motion of the end effector: viscous, and dry as μ v / |v|."""
+
+    acts: bool = True
 
     def parameters(self, n: int) -> Layout:
         """Return nothing."""
@@ -130,6 +138,8 @@ class Drag(AbstractElement):
 
     def act(self, at: Touch, s: SimpleNamespace, m: SimpleNamespace) -> Effect:
         """Return the force, which has the same form in any axes."""
+        if not self.acts:
+            return nothing(at.x.q.numel())
         v = at.velocity
         drag = (s.viscous_drag + s.dry_drag / cs.sqrt(cs.dot(v, v) + DRAG_WIDTH**2)) * v
         return nothing(at.x.q.numel())._replace(force=-drag, lost=cs.dot(drag, v))

@@ -21,8 +21,14 @@ PORTS = (
     Field("joint_loss", (), "J", "∫ (θ̇ − q̇)ᵀ D (θ̇ − q̇): lost in the real joints"),
 )
 """What passes the ports of a robot, and what it loses."""
-ELEMENTS: tuple[AbstractElement, ...] = (MotorFriction(), Drag())
-"""What touches the robot of a sampled loop."""
+Elements = tuple[AbstractElement, ...]
+ELEMENTS: Elements = (MotorFriction(), Drag())
+"""What may touch the robot of a sampled loop."""
+
+
+def touching(*, friction: bool, drag: bool) -> Elements:
+    """Return the elements of a sampled loop, of which these act."""
+    return MotorFriction(acts=friction), Drag(acts=drag)
 
 
 class Flow(NamedTuple):
@@ -43,7 +49,7 @@ class Plant:
     """
 
     robot: FlexibleJointRobot
-    elements: tuple[AbstractElement, ...] = ELEMENTS
+    elements: Elements = ELEMENTS
 
     @cached_property
     def parameters(self) -> Layout:

@@ -13,7 +13,7 @@ from passiflex.control.signals import Measurement
 from passiflex.layout import Field, Layout
 from passiflex.loops.parts import Parts
 from passiflex.loops.period_row import PeriodRow
-from passiflex.loops.plant import Plant
+from passiflex.loops.plant import ELEMENTS, Elements, Plant
 from passiflex.loops.witness import LARGEST, Instant, Witness
 from passiflex.native import Watch
 from passiflex.robots.arm import EndEffectorPose
@@ -37,11 +37,12 @@ class SampledLoop:
     """
 
     controller: SampledController
+    elements: Elements = ELEMENTS
 
     @cached_property
     def plant(self) -> Plant:
         """Return the plant."""
-        return Plant(self.controller.law.robot)
+        return Plant(self.controller.law.robot, self.elements)
 
     @cached_property
     def sensors(self) -> Sensors:

@@ -14,7 +14,6 @@ from numpy.typing import ArrayLike, NDArray
 from passiflex.errors import NameUnknownError, ValueRangeError
 from passiflex.loops.motion import Motion, Pose, pose_at, shifted
 from passiflex.loops.parts import Parts
-from passiflex.loops.sampled_loop import SampledLoop
 from passiflex.problems.posture import posture
 from passiflex.problems.problem import Problem, Sampling
 from passiflex.sampled.controller import SampledController
@@ -79,7 +78,7 @@ def altered(
     if plant is not None:
         data["robot"] = f"{law.robot.name}, changed in memory"
 
-    parts = SampledLoop(s.controller).parameters
+    parts = s.loop.parameters
     kept = data["control"].get("fallback", {})
     fallback = {k: v for k, v in own.items() if gains and k in gains and k not in kept and not _is_shaping(k)}
     numbers = replaced(parts, s.numbers, own, "gains")
@@ -147,7 +146,7 @@ def rewritten(text: str, entry: Mapping[str, Any]) -> str:
 def with_flange(problem: Problem, inertia: float) -> Problem:
     """Return the problem with this much more inertia [kg m^2] about every axis of the last link, known to the law."""
     layout, s = problem.law.robot.layout, _sampling(problem)
-    parts, numbers = SampledLoop(s.controller).parameters, s.numbers
+    parts, numbers = s.loop.parameters, s.numbers
     heavier: dict[str, Array] = {}
     for part, flat in (("plant", problem.plant), ("model", problem.model)):
         tensors = layout.unpack(flat)["link_inertia"].copy()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -10,6 +11,8 @@ from numpy.typing import NDArray
 
 from passiflex.control.law import AbstractLaw
 from passiflex.loops.motion import Motion, Pose
+from passiflex.loops.plant import Elements
+from passiflex.loops.sampled_loop import SampledLoop
 from passiflex.sampled.controller import SampledController
 
 Array = NDArray[np.float64]
@@ -63,6 +66,7 @@ class Sampling:
     Attributes
     ----------
     controller: The law with tank, governor and estimators.
+    elements: What touches the robot.
     period, delay, jitter: [s].
     missed: Share of periods in which the law does not run.
     insist: Whether to run a loop that is unstable by the limit map.
@@ -75,6 +79,7 @@ class Sampling:
     """
 
     controller: SampledController
+    elements: Elements
     period: float
     delay: float
     jitter: float
@@ -86,6 +91,11 @@ class Sampling:
     gains: tuple[GainChange, ...]
     feedforward: tuple[Interval, ...]
     drags: tuple[Interval, ...]
+
+    @cached_property
+    def loop(self) -> SampledLoop:
+        """Return the loop that runs."""
+        return SampledLoop(self.controller, self.elements)
 
 
 @dataclass(frozen=True, eq=False)

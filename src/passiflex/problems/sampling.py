@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from passiflex.control.law import AbstractLaw
 from passiflex.control.tank import NO_CAP
 from passiflex.errors import SizeError
+from passiflex.loops.plant import touching
 from passiflex.loops.sampled_loop import SampledLoop
 from passiflex.problems.gains import sized
 from passiflex.problems.posture import Posture
@@ -82,6 +83,7 @@ def sampling(
         TANKS[tank.kind or "port"]() if tank and law.has_tank else None,
         EXTERNAL[control.external_torque],
         INNER[control.inner_loop](round(control.delay * control.rate)),
+        actions=scenario.actions is not None or bool(scenario.feedforward),
     )
     motors, sensors = scenario.motors or MotorSettings(), scenario.sensors or SensorSettings()
     friction: dict[str, Any] = {
@@ -89,7 +91,11 @@ def sampling(
         "viscous_friction": _joints(robot, "motors.viscous_friction", motors.viscous_friction),
         "friction_width": motors.friction_width,
     }
-    parts = SampledLoop(controller).parameters
+    elements = touching(
+        friction=any(np.any(friction[f"{kind}_friction"]) for kind in ("coulomb", "viscous")),
+        drag=bool(scenario.drags),
+    )
+    parts = SampledLoop(controller, elements).parameters
     moved = np.diag(start.mass_matrix) + gains.get("shaped_inertia", model["motor_inertia"])
     numbers = parts.pack(
         plant=plant | friction,
@@ -110,6 +116,7 @@ def sampling(
     )
     return Sampling(
         controller=controller,
+        elements=elements,
         period=1 / control.rate,
         delay=control.delay,
         jitter=control.jitter,

@@ -131,7 +131,7 @@ def digest_batch(
 def lane_loop(problem: Problem, width: int | None = None) -> LaneLoop:
     """Return the native lanes for problems of this structure; from the process, the cache on disk, or compiled now."""
     assert problem.sampling is not None
-    key = (structure(problem.sampling.controller), width)
+    key = (structure(problem.sampling.loop), width)
     if key not in _lane_loops:
         loop = _compiled(problem).loop
         functions = LaneFunctions(
@@ -143,14 +143,14 @@ def lane_loop(problem: Problem, width: int | None = None) -> LaneLoop:
 
 def _compiled(problem: Problem) -> CompiledSampledLoop:
     assert problem.sampling is not None
-    return compiled_sampled_loop(problem.sampling.controller)
+    return compiled_sampled_loop(problem.sampling.loop)
 
 
 def _alike(problem: Problem) -> Hashable:
     """Return what problems have in common that can share lanes."""
     s = problem.sampling
     assert s is not None
-    return structure(s.controller), s.period, problem.duration, problem.output_interval
+    return structure(s.loop), s.period, problem.duration, problem.output_interval
 
 
 def _alone(problem: Problem, keep: Sequence[str]) -> Recording:

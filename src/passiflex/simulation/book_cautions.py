@@ -7,7 +7,6 @@ import dataclasses
 import numpy as np
 from numpy.typing import NDArray
 
-from passiflex.loops.sampled_loop import SampledLoop
 from passiflex.problems.altered import altered, replaced
 from passiflex.problems.problem import Problem
 from passiflex.stability.linear_loop import LinearLoop
@@ -56,7 +55,7 @@ def _lighter(problem: Problem, power: float) -> str:
 def _offset(problem: Problem) -> tuple[str, ...]:
     s = problem.sampling
     assert s is not None
-    parts = SampledLoop(s.controller).parameters
+    parts = s.loop.parameters
     offset = parts.unpack("errors", s.numbers)["torque_offset"]
     given, floor = float(offset.sum()) * REACH, problem.tank.floor
     if given <= floor:

@@ -46,7 +46,7 @@ def simulate_sampled(problem: Problem) -> Run:
 def simulate_unchecked(problem: Problem) -> Run:
     """Return the run of a sampled problem, stable or not."""
     assert problem.sampling is not None
-    return _record(charged(problem), compiled_sampled_loop(problem.sampling.controller))
+    return _record(charged(problem), compiled_sampled_loop(problem.sampling.loop))
 
 
 def start(problem: Problem, compiled: CompiledSampledLoop) -> LoopState:

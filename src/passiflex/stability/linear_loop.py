@@ -67,7 +67,7 @@ class LinearLoop:
         self.problem, self.s, self.at = problem, problem.sampling, at or standing(problem)
         self.native = native
         build = compiled_sampled_loop if native else interpreted_sampled_loop
-        self.compiled = build(problem.sampling.controller)
+        self.compiled = build(problem.sampling.loop)
         self.n = problem.law.robot.n
         self.parts = self.compiled.loop.parameters
         self.law = LawSlope(problem, self.at, self.compiled)

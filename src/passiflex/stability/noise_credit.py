@@ -12,7 +12,6 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import ArrayLike
 
-from passiflex.loops.sampled_loop import SampledLoop
 from passiflex.problems.altered import replaced
 from passiflex.problems.problem import Problem
 from passiflex.stability.linear_loop import DrivenLoop, LinearLoop
@@ -72,7 +71,5 @@ def charged(problem: Problem) -> Problem:
     credit = noise_credit(problem)
     if s is None or not credit:
         return problem
-    numbers = replaced(
-        SampledLoop(s.controller).parameters, s.numbers, {"noise_credit": POSTURES * credit}, "errors"
-    )
+    numbers = replaced(s.loop.parameters, s.numbers, {"noise_credit": POSTURES * credit}, "errors")
     return dataclasses.replace(problem, sampling=dataclasses.replace(s, numbers=numbers))
