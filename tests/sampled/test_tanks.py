@@ -16,7 +16,8 @@ from hypothesis import strategies as st
 
 from loops import SEEDS
 from passiflex.sampled.tank import LARGEST, AbstractTank, PeriodFlows, TankEntry, booked, finite
-from passiflex.sampled.tanks import PaperTank, PortTank, TimeDomainTank, VariableStiffnessTank
+from passiflex.sampled.tanks import TANKS, PaperTank, PortTank, TimeDomainTank, VariableStiffnessTank
+from passiflex.scenarios.tank_uses import SAMPLED
 from sampled.bench import Bench, Case, Contract
 from sampled.conformance import PROPERTIES, ROUND, violated
 from sampled.sequences import (
@@ -78,6 +79,7 @@ def test_recorded_and_long_sequences(tank: AbstractTank) -> None:
 class BrokenTank(AbstractTank):
     """The tank at the port with one of its methods replaced."""
 
+    flow: Callable[..., cs.SX] = PORT.flow
     settle: Callable[..., TankEntry] = PORT.settle
     pay: Callable[..., TankEntry] = PORT.pay
     budget: Callable[..., cs.SX] = PORT.budget
@@ -252,3 +254,34 @@ def test_the_variable_part_of_the_spring_goes_with_the_valve(case: Case) -> None
     bench = Bench(VARIABLE, CONTRACTS[VARIABLE], case)
     levels = np.append(case.levels(), np.linspace(case.g.tank_floor, case.g.tank_low, 20))
     np.testing.assert_array_equal(bench.stiffness_share(levels), bench.valve(levels))
+
+
+@pytest.mark.parametrize("tank", CONTRACTS, ids=named)
+def test_a_tank_says_of_itself_what_its_contract_says(tank: AbstractTank) -> None:
+    contract = CONTRACTS[tank]
+    assert (set(tank.reads), tank.charges, tank.gates) == (contract.reads, contract.charges, contract.gates)
+    assert TANKS[tank.kind] is type(tank)
+    assert tank.title
+
+
+def test_every_kind_of_tank_has_its_settings() -> None:
+    assert set(TANKS) == set(SAMPLED)
+
+
+class Leaking(AbstractTank):
+    """A tank that somebody brings: the port tank, less a tenth of all that comes in."""
+
+    kind, reads = "leaking", PortTank.reads
+
+    def flow(self, flows: PeriodFlows, g: SimpleNamespace) -> cs.SX:
+        flow = PORT.flow(flows, g)
+        return flow - cs.fmax(flow, 0) / 10
+
+
+def test_a_tank_from_outside_is_its_flow() -> None:
+    def flow(f: PeriodFlows, g: SimpleNamespace) -> np.ndarray:
+        taken = -f.storage_change - f.port_energy
+        return taken - np.maximum(taken, 0) / 10
+
+    contract = Contract(flow, frozenset(Leaking.reads))
+    assert violated(Leaking(), contract, fixed_cases()) == set()

@@ -93,7 +93,7 @@ def sampling(
     }
     elements = touching(
         friction=any(np.any(friction[f"{kind}_friction"]) for kind in ("coulomb", "viscous")),
-        drag=bool(scenario.drags),
+        drag=any(d.viscous or d.dry for d in scenario.drags),
     )
     parts = SampledLoop(controller, elements).parameters
     moved = np.diag(start.mass_matrix) + gains.get("shaped_inertia", model["motor_inertia"])

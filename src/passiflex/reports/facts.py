@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 import yaml
 
+from passiflex.sampled.tanks import TANKS
 from passiflex.scenarios.law_settings import (
     Damping,
     ImpedanceSettings,
@@ -25,12 +26,6 @@ GRAVITY = {
     "motor": "compensated at the motor position",
     "static": "compensated exactly at rest",
     "model": "cancelled by the law's model",
-}
-TANKS = {
-    "paper": "paper's tank",
-    "port": "port tank",
-    "time_domain": "time-domain passivity control",
-    "variable_stiffness": "tank for variable stiffness",
 }
 RELATIVE = ("joint_stiffness", "joint_damping", "motor_inertia", "link_inertia")
 
@@ -117,7 +112,7 @@ def _tank(scenario: Scenario) -> str:
     tank = scenario.tank
     if tank is None:
         return "none"
-    parts = [TANKS[tank.kind or "paper"], f"{tank.initial:g} J at the start", f"T_min {tank.floor:g} J"]
+    parts = [TANKS[tank.kind or "paper"].title, f"{tank.initial:g} J at the start", f"T_min {tank.floor:g} J"]
     parts += [f"cap {tank.cap:g} J"] if np.isfinite(tank.cap) else []
     parts += [f"filled by {tank.fill:.3g} of the dissipation"] if tank.fill != 1 else []
     parts += [f"at most {tank.power:g} W"] if np.isfinite(tank.power) else []

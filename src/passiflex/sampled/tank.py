@@ -11,6 +11,8 @@ import casadi as cs
 from passiflex.control.tank import smoothstep
 from passiflex.layout import Field, Layout
 
+UNLIMITED = 1e9
+"""A budget [J] that stands for none."""
 LARGEST = 1e100
 """Numbers above this one, infinities and NaN are no measurements: energies are squares of what passes."""
 
@@ -59,9 +61,19 @@ class TankEntry(NamedTuple):
 
 
 class AbstractTank(abc.ABC):
-    """An energy tank with levels, sampled: `settle` the period, see the `budget`, `pay`, ask the `valve`.
+    """An energy tank with levels, sampled: its `flow`, and a few words on what it does.
 
-    A tank never lifts its level for nothing, never divides by it, and knows measured quantities only.
+    A tank never lifts its level for nothing, never divides by it, and knows measured quantities only. Each period it
+    is settled, then pays within its budget, then says how far its valve is open.
+
+    Attributes
+    ----------
+    kind, title: Its name in a scenario, and in words.
+    reads: The fields of `PeriodFlows` that its flow is made of.
+    charges: Whether a change of the reference or of the stiffness costs anything.
+    gates: Whether what it grants has a bound.
+    measures: Whether the level follows from the measured port: what that may get wrong is then not granted.
+    falls_back: Whether a level below `tank_trip` means that the loop is active.
     """
 
     layout: ClassVar[Layout] = Layout(
@@ -76,30 +88,40 @@ class AbstractTank(abc.ABC):
             Field("tank_braking", (), "N m s/rad", "α_max: most damping that the tank adds, if it adds any"),
         )
     )
+    kind: ClassVar[str] = ""
+    title: ClassVar[str] = ""
+    reads: ClassVar[tuple[str, ...]] = ()
+    charges: ClassVar[bool] = True
+    gates: ClassVar[bool] = True
     measures: ClassVar[bool] = False
-    """Whether the level follows from the measured port: what that may get wrong is then not granted."""
     falls_back: ClassVar[bool] = False
-    """Whether a level below `tank_trip` means that the loop is active."""
 
     @abc.abstractmethod
+    def flow(self, flows: PeriodFlows, g: SimpleNamespace) -> cs.SX:
+        """Return what comes in for the period that ends now, out if negative [J]."""
+
     def settle(self, level: cs.SX, flows: PeriodFlows, g: SimpleNamespace) -> TankEntry:
         """Return the entry for the period that ends now."""
+        ok = finite(level, *(getattr(flows, name) for name in self.reads))
+        return booked(level, granted=0, flow=self.flow(flows, g), cap=g.tank_cap, ok=ok)
 
-    @abc.abstractmethod
     def pay(self, level: cs.SX, cost: cs.SX, g: SimpleNamespace) -> TankEntry:
         """Return the entry for a change of the reference or of the stiffness that stores `cost` [J]."""
+        if self.charges:
+            return paid(level, cost, g)
+        return booked(level, granted=0, flow=0, cap=g.tank_cap, ok=finite(level, cost))
 
-    @abc.abstractmethod
     def budget(self, level: cs.SX, elapsed: cs.SX, g: SimpleNamespace) -> cs.SX:
         """Return what may be granted now [J], ≥ 0."""
+        return above_floor(level, elapsed, g) if self.gates else cs.SX(UNLIMITED)
 
-    @abc.abstractmethod
     def braking(self, level: cs.SX, speed_squared: cs.SX, elapsed: cs.SX, g: SimpleNamespace) -> cs.SX:
         """Return the damping [N m s/rad] that the tank adds to the motors in this period, ≥ 0."""
+        return cs.SX(0)
 
-    @abc.abstractmethod
     def stiffness_share(self, level: cs.SX, g: SimpleNamespace) -> cs.SX:
         """Return how much of the stiffness above the base one may act, 0..1."""
+        return cs.SX(1)
 
     def valve(self, level: cs.SX, g: SimpleNamespace) -> cs.SX:
         """Return β(T): 0 at T_min, 1 from T_low on."""

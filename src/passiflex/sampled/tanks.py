@@ -7,10 +7,7 @@ from typing import ClassVar, final
 
 import casadi as cs
 
-from passiflex.sampled.tank import AbstractTank, PeriodFlows, TankEntry, above_floor, booked, finite, paid
-
-UNLIMITED = 1e9
-"""A budget [J] that stands for none."""
+from passiflex.sampled.tank import AbstractTank, PeriodFlows
 
 
 @final
@@ -22,30 +19,15 @@ class PortTank(AbstractTank):
     does, S + V̂(q) ≥ 0 with the weight V̂ of its model, and Σw − (V̂ − V̂₀) ≤ S₀ + V̂₀ + T₀.
     """
 
+    kind: ClassVar[str] = "port"
+    title: ClassVar[str] = "port tank"
+    reads: ClassVar[tuple[str, ...]] = ("storage_change", "port_energy")
     measures: ClassVar[bool] = True
     falls_back: ClassVar[bool] = True
 
-    def settle(self, level: cs.SX, flows: PeriodFlows, g: SimpleNamespace) -> TankEntry:
-        """Return the entry of −ΔS − w."""
-        ok = finite(level, flows.storage_change, flows.port_energy)
-        flow = -flows.storage_change - flows.port_energy
-        return booked(level, granted=0, flow=flow, cap=g.tank_cap, ok=ok)
-
-    def pay(self, level: cs.SX, cost: cs.SX, g: SimpleNamespace) -> TankEntry:
-        """Return the entry of a cost: ΔU, or |ΔU| if the tank is not signed."""
-        return paid(level, cost, g)
-
-    def budget(self, level: cs.SX, elapsed: cs.SX, g: SimpleNamespace) -> cs.SX:
-        """Return min(T − T_min, P_max Δt)."""
-        return above_floor(level, elapsed, g)
-
-    def braking(self, level: cs.SX, speed_squared: cs.SX, elapsed: cs.SX, g: SimpleNamespace) -> cs.SX:
-        """Return 0: what this tank does about an active loop is the fallback."""
-        return cs.SX(0)
-
-    def stiffness_share(self, level: cs.SX, g: SimpleNamespace) -> cs.SX:
-        """Return 1."""
-        return cs.SX(1)
+    def flow(self, flows: PeriodFlows, g: SimpleNamespace) -> cs.SX:
+        """Return −ΔS − w."""
+        return -flows.storage_change - flows.port_energy
 
 
 @final
@@ -56,26 +38,13 @@ class PaperTank(AbstractTank):
     credits energy that nobody dissipated.
     """
 
-    def settle(self, level: cs.SX, flows: PeriodFlows, g: SimpleNamespace) -> TankEntry:
-        """Return the entry of α P_D Δt."""
-        ok = finite(level, flows.claimed_loss)
-        return booked(level, granted=0, flow=g.tank_fill * flows.claimed_loss, cap=g.tank_cap, ok=ok)
+    kind: ClassVar[str] = "paper"
+    title: ClassVar[str] = "paper's tank"
+    reads: ClassVar[tuple[str, ...]] = ("claimed_loss",)
 
-    def pay(self, level: cs.SX, cost: cs.SX, g: SimpleNamespace) -> TankEntry:
-        """Return the entry of a cost, |ΔU| as printed or ΔU if the tank is signed."""
-        return paid(level, cost, g)
-
-    def budget(self, level: cs.SX, elapsed: cs.SX, g: SimpleNamespace) -> cs.SX:
-        """Return min(T − T_min, P_max Δt)."""
-        return above_floor(level, elapsed, g)
-
-    def braking(self, level: cs.SX, speed_squared: cs.SX, elapsed: cs.SX, g: SimpleNamespace) -> cs.SX:
-        """Return 0."""
-        return cs.SX(0)
-
-    def stiffness_share(self, level: cs.SX, g: SimpleNamespace) -> cs.SX:
-        """Return 1."""
-        return cs.SX(1)
+    def flow(self, flows: PeriodFlows, g: SimpleNamespace) -> cs.SX:
+        """Return α P_D Δt."""
+        return g.tank_fill * flows.claimed_loss
 
 
 @final
@@ -88,20 +57,16 @@ class TimeDomainTank(AbstractTank):
     reference: what that gives shows at the port a moment later.
     """
 
+    kind: ClassVar[str] = "time_domain"
+    title: ClassVar[str] = "time-domain passivity control"
+    reads: ClassVar[tuple[str, ...]] = ("port_energy",)
+    charges: ClassVar[bool] = False
+    gates: ClassVar[bool] = False
     measures: ClassVar[bool] = True
 
-    def settle(self, level: cs.SX, flows: PeriodFlows, g: SimpleNamespace) -> TankEntry:
-        """Return the entry of −w."""
-        ok = finite(level, flows.port_energy)
-        return booked(level, granted=0, flow=-flows.port_energy, cap=g.tank_cap, ok=ok)
-
-    def pay(self, level: cs.SX, cost: cs.SX, g: SimpleNamespace) -> TankEntry:
-        """Return an entry of nothing: the observer sees the port only."""
-        return booked(level, granted=0, flow=0, cap=g.tank_cap, ok=finite(level, cost))
-
-    def budget(self, level: cs.SX, elapsed: cs.SX, g: SimpleNamespace) -> cs.SX:
-        """Return no limit."""
-        return cs.SX(UNLIMITED)
+    def flow(self, flows: PeriodFlows, g: SimpleNamespace) -> cs.SX:
+        """Return −w."""
+        return -flows.port_energy
 
     def braking(self, level: cs.SX, speed_squared: cs.SX, elapsed: cs.SX, g: SimpleNamespace) -> cs.SX:
         """Return α = min(−E / (Δt |φ̇|²), α_max) while E < 0."""
@@ -109,10 +74,6 @@ class TimeDomainTank(AbstractTank):
         work = elapsed * speed_squared  # per unit of damping
         payable = work * g.tank_braking > debt
         return cs.if_else(payable, debt / cs.fmax(work, 1e-300), cs.if_else(debt > 0, g.tank_braking, 0))
-
-    def stiffness_share(self, level: cs.SX, g: SimpleNamespace) -> cs.SX:
-        """Return 1."""
-        return cs.SX(1)
 
 
 @final
@@ -124,23 +85,15 @@ class VariableStiffnessTank(AbstractTank):
     off. A change of the stiffness is free, and the reference is not gated.
     """
 
-    def settle(self, level: cs.SX, flows: PeriodFlows, g: SimpleNamespace) -> TankEntry:
-        """Return the entry of α ẋᵀD_xẋ Δt and of the work on the variable part."""
-        ok = finite(level, flows.claimed_cartesian_loss, flows.variable_spring_work)
-        flow = g.tank_fill * flows.claimed_cartesian_loss + flows.variable_spring_work
-        return booked(level, granted=0, flow=flow, cap=g.tank_cap, ok=ok)
+    kind: ClassVar[str] = "variable_stiffness"
+    title: ClassVar[str] = "tank for variable stiffness"
+    reads: ClassVar[tuple[str, ...]] = ("claimed_cartesian_loss", "variable_spring_work")
+    charges: ClassVar[bool] = False
+    gates: ClassVar[bool] = False
 
-    def pay(self, level: cs.SX, cost: cs.SX, g: SimpleNamespace) -> TankEntry:
-        """Return an entry of nothing."""
-        return booked(level, granted=0, flow=0, cap=g.tank_cap, ok=finite(level, cost))
-
-    def budget(self, level: cs.SX, elapsed: cs.SX, g: SimpleNamespace) -> cs.SX:
-        """Return no limit."""
-        return cs.SX(UNLIMITED)
-
-    def braking(self, level: cs.SX, speed_squared: cs.SX, elapsed: cs.SX, g: SimpleNamespace) -> cs.SX:
-        """Return 0."""
-        return cs.SX(0)
+    def flow(self, flows: PeriodFlows, g: SimpleNamespace) -> cs.SX:
+        """Return α ẋᵀD_xẋ Δt and the work on the variable part."""
+        return g.tank_fill * flows.claimed_cartesian_loss + flows.variable_spring_work
 
     def stiffness_share(self, level: cs.SX, g: SimpleNamespace) -> cs.SX:
         """Return β(T)."""
@@ -148,9 +101,6 @@ class VariableStiffnessTank(AbstractTank):
 
 
 TANKS: dict[str, type[AbstractTank]] = {
-    "port": PortTank,
-    "paper": PaperTank,
-    "time_domain": TimeDomainTank,
-    "variable_stiffness": VariableStiffnessTank,
+    tank.kind: tank for tank in (PortTank, PaperTank, TimeDomainTank, VariableStiffnessTank)
 }
 """By the name of their kind in a scenario."""

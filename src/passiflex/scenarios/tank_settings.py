@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -11,6 +11,11 @@ from passiflex.texts.quantity import Quantity
 from passiflex.texts.section import Mistakes, Section
 
 Energy = Annotated[float, Quantity("J", least=0)]
+
+if TYPE_CHECKING:
+    Kind = str
+else:
+    Kind = Literal[tuple(SAMPLED)]
 
 PAPER_DEFAULTS: dict[str, Any] = {"accounting": "paper"}
 PORT_DEFAULTS: dict[str, Any] = {"accounting": "signed", "floor": 0.1, "low": 0.2}
@@ -43,7 +48,7 @@ class TankSettings(Section):
         default=None,
         description="a moving reference draws |P_X| (paper; default) or P_X (signed; default of the port tank)",
     )
-    kind: Literal["paper", "port", "time_domain", "variable_stiffness"] | None = Field(
+    kind: Kind | None = Field(
         default=None,
         description="whose books: paper (default without control), port (default with control), or those "
         "after Hannaford and Ryu and after Ferraguti",
