@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import abc
-from collections.abc import Mapping
+from collections.abc import Hashable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from types import SimpleNamespace
@@ -55,6 +55,11 @@ class AbstractLaw(abc.ABC):
     """Whether it gives the joints another stiffness and the motors another inertia."""
 
     @property
+    def structure(self) -> Hashable:
+        """Return what its expressions depend on beside the robot: laws that agree in it share compiled code."""
+        return self
+
+    @property
     @abc.abstractmethod
     def layout(self) -> Layout:
         """Return the gains."""
@@ -101,6 +106,11 @@ class ImpedanceLaw(AbstractLaw):
     gravity: AbstractGravity = RobotGravity()
     has_tank = True
     shapes = True
+
+    @property
+    def structure(self) -> Hashable:
+        """Return the choices."""
+        return type(self), self.task, self.gravity
 
     @cached_property
     def layout(self) -> Layout:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Hashable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from types import SimpleNamespace
@@ -42,6 +42,11 @@ class RigidImpedanceLaw(AbstractLaw):
     gravity: AbstractGravity = RobotGravity()
     has_tank = False
     shapes = False
+
+    @property
+    def structure(self) -> Hashable:
+        """Return the choices."""
+        return type(self), self.task, self.gravity
 
     @cached_property
     def layout(self) -> Layout:

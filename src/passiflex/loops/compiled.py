@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Hashable
 from dataclasses import dataclass
 from functools import lru_cache
 
 import casadi as cs
 
-from passiflex.control.gravity import AbstractGravity
 from passiflex.control.law import AbstractLaw
-from passiflex.control.task import AbstractTask
 from passiflex.loops.closed_loop import ClosedLoop
 from passiflex.loops.plant import Elements
 from passiflex.loops.sampled_loop import SampledLoop
@@ -24,11 +23,12 @@ from passiflex.native import (
 )
 from passiflex.robots.arm import SerialArm
 from passiflex.sampled.controller import SampledController
+from passiflex.sampled.tanks import TANKS
 
 CVODES_DERIVATIVES = {"fd_method": "forward", "is_diff_in": [True, False, False]}
 """CVODES needs ∂ẋ/∂x only, and one-sided differences are enough for its Newton iteration."""
 
-_built: dict[tuple[str, type[AbstractLaw], AbstractTask, AbstractGravity], CompiledLoop] = {}
+_built: dict[Hashable, CompiledLoop] = {}
 
 _built_sampled: dict[tuple[object, ...], CompiledSampledLoop] = {}
 
@@ -55,8 +55,7 @@ class CompiledLoop:
 
 def compiled_loop(law: AbstractLaw) -> CompiledLoop:
     """Return the compiled closed loop of a law; from the process, the cache on disk, or compiled now."""
-    # The laws are final: their type, task and gravity choice are all that their code depends on.
-    key = (_urdf(law.robot.arm), type(law), law.task, law.gravity)
+    key = _urdf(law.robot.arm), law.structure
     if key not in _built:
         _built[key] = _compile(ClosedLoop(law))
     return _built[key]
@@ -110,10 +109,11 @@ def _interpreted(controller: SampledController, elements: Elements) -> CompiledS
 
 def structure(loop: SampledLoop) -> tuple[object, ...]:
     """Return what the code of a sampled loop depends on; loops that agree in it share compiled code."""
-    controller, law = loop.controller, loop.controller.law
+    controller, law, tank = loop.controller, loop.controller.law, loop.controller.tank
+    of_tank = type(tank) if tank is None or type(tank) in TANKS.values() else tank
     return (
-        _urdf(law.robot.arm), type(law), law.task, law.gravity, type(controller.tank), controller.external,
-        controller.inner, controller.actions, loop.elements,
+        _urdf(law.robot.arm), law.structure, of_tank, controller.external, controller.inner, controller.actions,
+        loop.elements,
     )  # fmt: skip
 
 

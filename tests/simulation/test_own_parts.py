@@ -1,0 +1,164 @@
+"""Parts that somebody brings: a law, a tank, an element; in place of those of a scenario, from outside the package."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import Any
+
+import casadi as cs
+import numpy as np
+import pytest
+from numpy.typing import ArrayLike
+
+import passiflex as pf
+from passiflex.control.gravity import AbstractGravity, RobotGravity
+from passiflex.control.law import AbstractLaw, Array, ImpedanceLaw
+from passiflex.control.signals import Command, Measurement, Reference, Stored
+from passiflex.control.task import AbstractTask
+from passiflex.errors import NameUnknownError, SizeError, ValueRangeError
+from passiflex.layout import Field, Layout
+from passiflex.loops.elements import AbstractElement, Effect, Touch, nothing
+from passiflex.problems.own_parts import with_parts
+from passiflex.robots.flexible import FlexibleJointRobot
+from passiflex.sampled.tank import AbstractTank, PeriodFlows
+from passiflex.sampled.tanks import PortTank
+from passiflex.simulation import resolve
+from worlds import world
+
+PUSH = [{"from": 0.05, "to": 0.15, "force": [0, 0, 10]}]
+SHORT: dict[str, Any] = {"forces": PUSH, "duration": 0.3}
+
+
+class Leaking(AbstractTank):
+    """The port tank, less a tenth of all that comes in."""
+
+    kind, title, reads = "leaking", "leaking tank", PortTank.reads
+    measures = falls_back = True
+
+    def flow(self, flows: PeriodFlows, g: SimpleNamespace) -> cs.SX:
+        flow = -flows.storage_change - flows.port_energy
+        return flow - cs.fmax(flow, 0) / 10
+
+
+@dataclass(frozen=True)
+class Brush(AbstractElement):
+    """A drag along the motion of the end effector that grows with its speed."""
+
+    strength: float
+    acts: bool = True
+
+    def parameters(self, n: int) -> Layout:
+        return Layout(())
+
+    def inputs(self) -> Layout:
+        return Layout(())
+
+    def act(self, at: Touch, s: SimpleNamespace, m: SimpleNamespace) -> Effect:
+        drag = self.strength * cs.norm_2(cs.vertcat(at.velocity, 1e-6)) * at.velocity
+        return nothing(at.x.q.numel())._replace(force=-drag, lost=cs.dot(drag, at.velocity))
+
+
+@dataclass(frozen=True, eq=False)
+class Braked(AbstractLaw):
+    """The paper's law with a brake on the shaped motors, of a gain of its own."""
+
+    inner: ImpedanceLaw
+    has_tank = True
+    shapes = True
+
+    @property
+    def robot(self) -> FlexibleJointRobot:  # type: ignore[override]
+        return self.inner.robot
+
+    @property
+    def task(self) -> AbstractTask:  # type: ignore[override]
+        return self.inner.task
+
+    @property
+    def gravity(self) -> AbstractGravity:  # type: ignore[override]
+        return self.inner.gravity
+
+    @property
+    def layout(self) -> Layout:
+        return self.inner.layout + Layout((Field("brake", (), "N m s/rad"),))
+
+    def command(
+        self, y: Measurement, reference: Reference, m: SimpleNamespace, g: SimpleNamespace, added: Any = 0.0
+    ) -> Command:
+        moving = self.inner.stored(y, m, g).dphi
+        return self.inner.command(y, reference, m, g, added - g.brake * moving)
+
+    def stored(self, y: Measurement, m: SimpleNamespace, g: SimpleNamespace) -> Stored:
+        return self.inner.stored(y, m, g)
+
+    def posture_at_rest(self, q: Array, theta: Array, K: Array, gains: Mapping[str, ArrayLike]) -> Array:
+        return self.inner.posture_at_rest(q, theta, K, gains)
+
+    def motors(self, m: SimpleNamespace, g: SimpleNamespace) -> cs.SX:
+        return self.inner.motors(m, g)
+
+
+def braked(robot: str = "planar2r") -> Braked:
+    of = resolve(world()).law
+    return Braked(ImpedanceLaw(FlexibleJointRobot.load(robot), of.task, RobotGravity()))
+
+
+def test_a_tank_of_ones_own_keeps_its_own_books() -> None:
+    scenario = world(**SHORT)
+    ours, theirs = pf.simulate(scenario, tank=Leaking()), pf.simulate(scenario)
+    assert pf.audit(ours).verdict == "passive"
+    assert ours["refilled_energy"][-1] < 0.95 * theirs["refilled_energy"][-1]
+    np.testing.assert_allclose(ours["q"], theirs["q"], atol=1e-12)  # as long as it is not empty
+
+
+@pytest.mark.parametrize("strength", [5.0, 50.0])
+def test_an_element_of_ones_own_takes_energy_out(strength: float) -> None:
+    scenario = world(**SHORT)
+    ours, theirs = pf.simulate(scenario, elements=[Brush(strength)]), pf.simulate(scenario)
+    assert pf.audit(ours).verdict == "passive"
+    assert np.abs(ours["dq"]).max() < np.abs(theirs["dq"]).max()
+    assert abs(pf.audit(ours).ledger_residual) < 1e-6
+    none = pf.simulate(scenario, elements=[Brush(0.0)])
+    np.testing.assert_allclose(none["q"], theirs["q"], atol=1e-12)
+
+
+@pytest.mark.parametrize("control", ["sampled", "continuous"])
+def test_a_law_of_ones_own_has_gains_of_its_own(control: str) -> None:
+    without = {} if control == "sampled" else {"control": None, "tank": None, "noise": None}
+    scenario = world(**SHORT, **without)
+    plain = pf.simulate(scenario)
+    same = pf.simulate(scenario, law=braked(), gains={"brake": 0.0})
+    np.testing.assert_allclose(same["q"], plain["q"], atol=1e-9)
+    slow = pf.simulate(scenario, law=braked(), gains={"brake": 20.0})
+    assert np.abs(slow["dphi"]).max() < 0.9 * np.abs(plain["dphi"]).max()
+    assert slow.data.attrs["law"] == "Braked"
+    assert slow.data.attrs["configuration"].startswith("# With parts that no scenario has: Braked.\n")
+    assert pf.Run(slow.data).name == scenario.name
+
+
+def test_what_does_not_fit_is_said() -> None:
+    problem = resolve(world())
+    still = resolve(world(control=None, tank=None, noise=None))
+
+    @dataclass(frozen=True)
+    class Numbered(Brush):
+        def parameters(self, n: int) -> Layout:
+            return Layout((Field("bristles", (), "1"),))
+
+    for wrong, error, message in (
+        (lambda: with_parts(problem, law=braked("iiwa14")), ValueRangeError, "for another robot; got iiwa14"),
+        (lambda: with_parts(problem, law=braked()), SizeError, "parameter 'brake' is missing"),
+        (lambda: with_parts(problem, law=braked(), gains={"brak": 1.0}), NameUnknownError, "try 'brake'"),
+        (lambda: with_parts(problem, gains={"brake": 1.0}), ValueRangeError, "a law of one's own; got brake"),
+        (
+            lambda: with_parts(problem, elements=[Numbered(1.0)]),
+            ValueRangeError,
+            "has parameters; got Numbered",
+        ),
+        (lambda: with_parts(still, tank=Leaking()), ValueRangeError, "are for sampled loops"),
+    ):
+        with pytest.raises(error, match=message):
+            wrong()
+    assert with_parts(problem) is problem
