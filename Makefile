@@ -37,7 +37,8 @@ check: $(VENV)/.dev-stamp $(WEB_PACKAGES) ## lint, formatting and types; types a
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
-	$(BIN)/vermin --quiet --no-tips --violations --target=3.11- --backport typing_extensions src tests benchmarks hatch_build.py
+	cd tests && ../$(BIN)/mypy --strict --config-file= --cache-dir=../.mypy_cache/outside typed_use.py
+	$(BIN)/vermin --quiet --no-tips --violations --target=3.11- --backport typing_extensions src tests benchmarks examples hatch_build.py
 	$(BIN)/python hatch_build.py npm run check
 	$(BIN)/python hatch_build.py npm test
 

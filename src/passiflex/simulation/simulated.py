@@ -1,0 +1,44 @@
+"""The run of a scenario, with parts of one's own if there are any."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from numpy.typing import ArrayLike
+
+from passiflex.control.law import AbstractLaw
+from passiflex.loops.elements import AbstractElement
+from passiflex.problems.own_parts import with_parts
+from passiflex.problems.resolution import resolve
+from passiflex.runs.run import Run
+from passiflex.sampled.tank import AbstractTank
+from passiflex.scenarios.scenario import Scenario
+from passiflex.scenarios.scenario_file import as_scenario
+from passiflex.simulation.through_time import simulate_problem
+
+
+def simulate(
+    scenario: Scenario | Mapping[str, Any] | str | Path,
+    *,
+    law: AbstractLaw | None = None,
+    gains: Mapping[str, ArrayLike] | None = None,
+    tank: AbstractTank | None = None,
+    elements: Sequence[AbstractElement] = (),
+) -> Run:
+    """Return the run of a scenario, of a mapping with the entries of a scenario file, or of the file at a path.
+
+    A run that leaves the finite numbers is a result too; it ends there, and `Run.failure` says why.
+
+    Parameters
+    ----------
+    law, gains, tank, elements: Parts of your own, as `problems.own_parts.with_parts` takes them.
+
+    Raises
+    ------
+    PassiflexError
+        If the scenario has mistakes or does not fit its robot, or parts do not fit the scenario.
+    """
+    problem = resolve(as_scenario(scenario))
+    return simulate_problem(with_parts(problem, law=law, gains=gains, tank=tank, elements=elements))
