@@ -18,7 +18,6 @@ class Brush(AbstractElement):
     """A drag that grows with the square of the speed."""
 
     strength: float  # N s²/m²
-    acts: bool = True
 
     def parameters(self, n):
         return Layout(())

@@ -232,7 +232,8 @@ def test_a_manifest_of_before_is_read(tmp_path: Path) -> None:
     [
         ("views/panel.py", False), ("reports/page.py", False), ("reports/bundle/viewer.js", False),
         ("exports/csv_file.py", False), ("plotting/run.py", False), ("cli/commands.py", False),
-        ("simulation/resolve.py", True), ("robots/data/iiwa14.urdf", True), ("native/lanes.h", True),
+        ("problems/resolution.py", True), ("loops/plant.py", True), ("robots/data/iiwa14.urdf", True),
+        ("native/lanes.h", True),
         ("campaigns/measures.py", True), ("passivity/audit.py", True), ("pieces/tables.py", True),
     ],
 )  # fmt: skip

@@ -17,7 +17,7 @@ from passiflex.control.gravity import AbstractGravity, RobotGravity
 from passiflex.control.law import AbstractLaw, Array, ImpedanceLaw
 from passiflex.control.signals import Command, Measurement, Reference, Stored
 from passiflex.control.task import AbstractTask
-from passiflex.errors import NameUnknownError, SizeError, ValueRangeError
+from passiflex.errors import ArgumentError, NameUnknownError, SizeError, ValueRangeError
 from passiflex.layout import Field, Layout
 from passiflex.loops.elements import AbstractElement, Effect, Touch, nothing
 from passiflex.problems.own_parts import with_parts
@@ -47,7 +47,6 @@ class Brush(AbstractElement):
     """A drag along the motion of the end effector that grows with its speed."""
 
     strength: float
-    acts: bool = True
 
     def parameters(self, n: int) -> Layout:
         return Layout(())
@@ -147,7 +146,22 @@ def test_what_does_not_fit_is_said() -> None:
         def parameters(self, n: int) -> Layout:
             return Layout((Field("bristles", (), "1"),))
 
+    @dataclass(frozen=True)
+    class OnMotors(Brush):
+        def act(self, at: Touch, s: SimpleNamespace, m: SimpleNamespace) -> Effect:
+            return nothing(at.x.q.numel())._replace(motor=-at.x.dtheta, lost=cs.sumsqr(at.x.dtheta))
+
+    matched = resolve(world(control={"inner_loop": "matched"}))
     for wrong, error, message in (
+        (lambda: with_parts(problem, tank=Leaking), ArgumentError, "an instance of AbstractTank"),
+        (lambda: with_parts(problem, law="mine"), ArgumentError, "an instance of AbstractLaw"),
+        (lambda: with_parts(problem, elements=Brush(1.0)), ArgumentError, "a list of elements"),
+        (lambda: with_parts(problem, elements=[Brush]), ArgumentError, "an instance of AbstractElement"),
+        (
+            lambda: with_parts(matched, law=braked(), gains={"brake": 1.0}),
+            ValueRangeError,
+            "the law cannot be matched; got Braked; needs `inner_loop: plain`",
+        ),
         (lambda: with_parts(problem, law=braked("iiwa14")), ValueRangeError, "for another robot; got iiwa14"),
         (lambda: with_parts(problem, law=braked()), SizeError, "parameter 'brake' is missing"),
         (lambda: with_parts(problem, law=braked(), gains={"brak": 1.0}), NameUnknownError, "try 'brake'"),
@@ -157,6 +171,7 @@ def test_what_does_not_fit_is_said() -> None:
             ValueRangeError,
             "has parameters; got Numbered",
         ),
+        (lambda: with_parts(problem, elements=[OnMotors(1.0)]), ValueRangeError, "the motors; got OnMotors"),
         (lambda: with_parts(still, tank=Leaking()), ValueRangeError, "are for sampled loops"),
     ):
         with pytest.raises(error, match=message):

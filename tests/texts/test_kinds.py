@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -34,9 +33,15 @@ READERS: dict[str, Callable[[Path], Any]] = {
 def test_another_kind_is_named_with_what_to_do(wanted: str, given: str, tmp_path: Path) -> None:
     path = tmp_path / "given.yaml"
     path.write_text(TEXTS[given])
-    if wanted == given:
-        with suppress(RobotError, ScenarioError):  # of files that are not there
+    if (
+        wanted == given
+    ):  # of which a campaign names itself for its scenario, and a robot file what is not there
+        said = ""
+        try:
             READERS[wanted](path)
+        except (RobotError, ScenarioError) as error:
+            said = str(error)
+        assert f"not a {wanted}" not in said
         return
     with pytest.raises(PassiflexError) as refused:
         READERS[wanted](path)
@@ -56,6 +61,13 @@ def test_a_robot_of_the_catalogue_is_no_scenario(tmp_path: Path, monkeypatch: py
         PassiflexError, match=r"this is a robot, not a scenario; try passiflex recommend iiwa14 --rate"
     ):
         load_scenario("iiwa14")
+    (tmp_path / "planar2r").write_text(
+        TEXTS["scenario"]
+    )  # which is no path, and means the one of the catalogue
+    assert FlexibleJointRobot.load("planar2r").n == 2
+    (tmp_path / "mine").write_text(TEXTS["scenario"])
+    with pytest.raises(PassiflexError, match=r"mine: this is a scenario, not a robot file"):
+        FlexibleJointRobot.load("mine")
     with pytest.raises(PassiflexError, match=r"small: 1 mistake\n  cannot be read: No such file"):
         load_scenario("small")
 

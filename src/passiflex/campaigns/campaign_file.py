@@ -11,11 +11,10 @@ from passiflex.campaigns.campaign import Campaign
 from passiflex.errors import ScenarioError
 from passiflex.files import as_path
 from passiflex.scenarios.scenario import Scenario
-from passiflex.scenarios.scenario_file import load_scenario, read_scenario, read_text
-from passiflex.texts.kinds import of_another_kind
+from passiflex.scenarios.scenario_file import load_scenario, read_scenario, read_text, read_tree
 from passiflex.texts.model_mistakes import explained
 from passiflex.texts.quantity import shown
-from passiflex.texts.yaml_tree import RefusedText, Tree
+from passiflex.texts.yaml_tree import Tree
 
 A_CAMPAIGN = "a campaign needs at least name, scenario and samples"
 
@@ -40,13 +39,7 @@ def parse_campaign(text: str, source: str = "campaign", base_dir: str | Path | N
     ScenarioError
         With one line for each mistake: line, column, name, what is wrong and what to do.
     """
-    tree = Tree()
-    try:
-        data = tree.read(text, A_CAMPAIGN)
-    except RefusedText as error:
-        raise ScenarioError(source, [str(error)]) from None
-    if (other := of_another_kind(data, "campaign", source)) is not None:
-        raise ScenarioError(source, [other])
+    data, tree = read_tree(text, "campaign", A_CAMPAIGN, source)
     left_out = data.get("scenario") is None
     if not left_out:
         scenario = _scenario(data.pop("scenario"), tree, base_dir)

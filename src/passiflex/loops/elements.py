@@ -1,7 +1,7 @@
 """What touches a robot: elements with one port each, at the motors or at the end effector.
 
-An element never gives more than it stores: the power that it gives through its port, the rate of what it stores and
-what it loses add up to zero, and what it loses is ≥ 0. That is the first test of a new one.
+An element gives nothing of its own: the power that it gives through its port and what it loses add up to zero, and what
+it loses is ≥ 0. That is the first test of a new one. None of them stores energy yet.
 """
 
 from __future__ import annotations
@@ -42,25 +42,18 @@ class Effect(NamedTuple):
     ----------
     motor: Torque on the motors (n,) [N m].
     force, moment: On the end effector (3,) [N, N m].
-    stored: [J].
     lost: [W], ≥ 0.
     """
 
     motor: cs.SX
     force: cs.SX
     moment: cs.SX
-    stored: cs.SX
     lost: cs.SX
-
-    def power(self, at: Touch) -> cs.SX:
-        """Return what the element gives to the robot [W]."""
-        at_tip = cs.dot(self.force, at.velocity) + cs.dot(self.moment, at.spin)
-        return cs.dot(self.motor, at.x.dtheta) + at_tip
 
 
 def nothing(n: int) -> Effect:
     """Return the effect of no element, of which an element's own differs by what it does."""
-    return Effect(cs.SX.zeros(n), cs.SX.zeros(3), cs.SX.zeros(3), cs.SX(0), cs.SX(0))
+    return Effect(cs.SX.zeros(n), cs.SX.zeros(3), cs.SX.zeros(3), cs.SX(0))
 
 
 class AbstractElement(abc.ABC):
@@ -70,11 +63,10 @@ class AbstractElement(abc.ABC):
     ----------
     booked: Under which name a run has what it lost; empty if that is part of what the surroundings gave.
     meaning: What that is, in words.
-    acts: False leaves its arithmetic out, where all its numbers are 0; its numbers stay where they are.
+    acts: False leaves its arithmetic out, where all its numbers are 0; they stay where they are.
     """
 
-    acts: bool
-
+    acts = True
     booked: ClassVar[str] = ""
     meaning: ClassVar[str] = ""
 
@@ -110,8 +102,6 @@ class MotorFriction(AbstractElement):
 
     def act(self, at: Touch, s: SimpleNamespace, m: SimpleNamespace) -> Effect:
         """Return the friction torque."""
-        if not self.acts:
-            return nothing(at.x.q.numel())
         rubbing = friction(at.x.dtheta, m.coulomb_friction, m.viscous_friction, m.friction_width)
         return nothing(rubbing.numel())._replace(motor=-rubbing, lost=cs.dot(rubbing, at.x.dtheta))
 
@@ -138,8 +128,6 @@ class Drag(AbstractElement):
 
     def act(self, at: Touch, s: SimpleNamespace, m: SimpleNamespace) -> Effect:
         """Return the force, which has the same form in any axes."""
-        if not self.acts:
-            return nothing(at.x.q.numel())
         v = at.velocity
         drag = (s.viscous_drag + s.dry_drag / cs.sqrt(cs.dot(v, v) + DRAG_WIDTH**2)) * v
         return nothing(at.x.q.numel())._replace(force=-drag, lost=cs.dot(drag, v))

@@ -106,11 +106,11 @@ class Plant:
         """Return what happens in the state x under a motor torque."""
         arm = self.robot.arm
         at = Touch(x, *arm.tip_velocity(x.q, x.dq, m))
-        effects = [e.act(at, s, m) for e in self.elements]
+        effects = self._effects(at, s, m)
         touched = _sum(effects, self.robot.n)
         given = TipWrench(*(arm.in_tip_axes(x.q, half) for half in cs.vertsplit(s.F_e, 3)))
         pushed = TipWrench(given.force + touched.force, given.moment + touched.moment)
-        a = self.robot.pushed(x, tau_m + touched.motor, pushed, m)
+        a = self.robot.acceleration(x, tau_m + touched.motor, pushed, m)
         stretch = x.dtheta - x.dq
         powers = {
             "external": cs.dot(pushed.force, at.velocity) + cs.dot(pushed.moment, at.spin),
@@ -121,11 +121,14 @@ class Plant:
         lost = {e.booked: f.lost for e, f in zip(self.elements, effects, strict=True) if e.booked}
         return Flow(a.ddq, a.ddtheta, powers | lost)
 
+    def _effects(self, at: Touch, s: SimpleNamespace, m: SimpleNamespace) -> list[Effect]:
+        return [e.act(at, s, m) if e.acts else nothing(self.robot.n) for e in self.elements]
+
     def wrench(self, x: RobotState, s: SimpleNamespace, m: SimpleNamespace) -> cs.SX:
         """Return all that acts on the end effector, in world axes (6,)."""
         arm = self.robot.arm
         at = Touch(x, *arm.tip_velocity(x.q, x.dq, m))
-        touched = _sum([e.act(at, s, m) for e in self.elements], self.robot.n)
+        touched = _sum(self._effects(at, s, m), self.robot.n)
         return s.F_e + cs.vertcat(*(arm.in_world_axes(x.q, part) for part in (touched.force, touched.moment)))
 
     def true(self, x: RobotState, s: SimpleNamespace, m: SimpleNamespace) -> dict[str, cs.SX]:

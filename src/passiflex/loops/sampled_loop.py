@@ -62,19 +62,9 @@ class SampledLoop:
     def memory(self) -> Layout:
         """Return the state of `control`: the sensors', the controller's, and the torque of the motors."""
         n = self.controller.law.robot.n
-        torque = Layout(
-            (
-                Field(
-                    "given_torque",
-                    (n,),
-                    "N m",
-                    "that the motors were last told to give",
-                    kept=False,
-                    acts=True,
-                ),
-            )
-        )
-        return self.sensors.state + self.controller.state + torque
+        told = "that the motors were last told to give"
+        torque = Field("given_torque", (n,), "N m", told, kept=False, acts=True)
+        return self.sensors.state + self.controller.state + Layout((torque,))
 
     def start(self, at: Rest) -> NDArray[np.float64]:
         """Return the memory at rest, flat."""

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping, Sequence
+from types import SimpleNamespace
 from typing import Any
 
+import casadi as cs
 from numpy.typing import ArrayLike
 
-from passiflex.control.law import AbstractLaw
-from passiflex.errors import ValueRangeError
-from passiflex.loops.elements import AbstractElement
+from passiflex.control.law import AbstractLaw, ImpedanceLaw
+from passiflex.errors import ArgumentError, ValueRangeError
+from passiflex.loops.elements import AbstractElement, Effect, Touch
 from passiflex.problems.problem import Problem
+from passiflex.robots.flexible import RobotState
+from passiflex.sampled.matched_loop import MatchedInnerLoop
 from passiflex.sampled.tank import AbstractTank
 
 
@@ -30,15 +34,24 @@ def with_parts(
     law: In place of the scenario's, for the same robot; its gains are those of the scenario that have their names.
     gains: Of the law, by name, in place of the scenario's or beside them.
     tank: In place of the scenario's, with its settings.
-    elements: What touches the robot beside the rest; their numbers are their own, so they have no parameters.
+    elements: What touches the end effector beside the rest; their numbers are their own, so they have no parameters.
 
     Raises
     ------
     ValueRangeError
-        For another robot's law, elements with parameters, or a tank or elements in continuous time.
+        For another robot's law, or one in a matched loop, elements with parameters or on the motors, or a tank or
+        elements in continuous time.
+    ArgumentError
+        For what is no such part, as its class.
     NameUnknownError, SizeError
         For gains that the law does not have, or lacks.
     """
+    if not isinstance(elements, Sequence):
+        raise ArgumentError(elements, "a list of elements")
+    kinds = (law, AbstractLaw), (tank, AbstractTank), *((element, AbstractElement) for element in elements)
+    for part, kind in kinds:
+        if not isinstance(part, kind | None):
+            raise ArgumentError(part, f"an instance of {kind.__name__}, from a class of your own")
     changed = problem
     if law is not None:
         changed = _with_law(changed, law, dict(gains or {}))
@@ -67,6 +80,9 @@ def _with_law(problem: Problem, law: AbstractLaw, gains: dict[str, Any]) -> Prob
     s = problem.sampling
     if s is None:
         return changed
+    if isinstance(s.controller.inner, MatchedInnerLoop) and not isinstance(law, ImpedanceLaw):
+        needs = "`inner_loop: plain`, as the matched one takes the paper's law apart"
+        raise ValueRangeError("the law cannot be matched", got=type(law).__name__, needs=needs)
     before, controller = s.loop.parameters, dataclasses.replace(s.controller, law=law)
     values = {name: before.unpack(name, s.numbers) for name in before._fields}
     values["gains"], values["fallback"] = packed(values["gains"]), packed(values["fallback"])
@@ -90,6 +106,17 @@ def _touched(problem: Problem, tank: AbstractTank | None, elements: tuple[Abstra
         raise ValueRangeError(
             "an element of one's own has parameters", got=got, needs="attributes of its own"
         )
+    if wrong := [e for e in elements if e.booked or not _effect(e, n).motor.is_zero()]:
+        got = ", ".join(type(e).__name__ for e in wrong)
+        needs = "a force or a moment on the end effector: the ledger of the motors knows their friction only"
+        raise ValueRangeError("an element of one's own touches the motors", got=got, needs=needs)
     controller = dataclasses.replace(s.controller, tank=tank or s.controller.tank)
     sampling = dataclasses.replace(s, controller=controller, elements=(*s.elements, *elements))
     return dataclasses.replace(problem, sampling=sampling)
+
+
+def _effect(element: AbstractElement, n: int) -> Effect:
+    """Return what an element does, in symbols."""
+    x = RobotState(*(cs.SX.sym(name, n) for name in RobotState._fields))
+    at = Touch(x, cs.SX.sym("velocity", 3), cs.SX.sym("spin", 3))
+    return element.act(at, SimpleNamespace(), SimpleNamespace())

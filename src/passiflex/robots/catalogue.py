@@ -91,9 +91,9 @@ def read_description(name_or_path: str | Path) -> RobotDescription:
         raise a_urdf(str(name_or_path))
     if is_path(name_or_path):
         return _read(Path(name_or_path))
-    if (other := another_file(Path(name_or_path), "robot file")) is not None:
-        raise RobotError(f"{name_or_path}: {other}")
     if name_or_path not in catalogue():
+        if (other := another_file(Path(name_or_path), "robot file")) is not None:
+            raise RobotError(f"{name_or_path}: {other}")
         raise NameUnknownError("robot", str(name_or_path), catalogue())
     with resources.as_file(resources.files(__package__) / "data" / f"{name_or_path}.yaml") as shipped:
         return _read(shipped, quiet=True)

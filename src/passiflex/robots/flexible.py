@@ -119,21 +119,20 @@ class FlexibleJointRobot:
         """Return τ_a = K (θ − q) + D (θ̇ − q̇) [N m], the last line of (2)."""
         return m.joint_stiffness * (x.theta - x.q) + m.joint_damping * (x.dtheta - x.dq)
 
-    def pushed(self, x: RobotState, tau_m: cs.SX, at_tip: TipWrench, m: SimpleNamespace) -> Acceleration:
-        """Return q̈, θ̈ of (2) under the motor torque τ_m [N m] and a wrench on the end effector."""
-        tau_a, arm = self.joint_torque(x, m), self.arm
-        resisting = arm.bias_torque(x.q, x.dq, m, at_tip)
-        ddq = solve_spd(arm.mass_matrix(x.q, m), tau_a - resisting)
-        return Acceleration(ddq, (tau_m - tau_a) / m.motor_inertia, tau_a)
+    def acceleration(
+        self, x: RobotState, tau_m: cs.SX, external: cs.SX | TipWrench, m: SimpleNamespace
+    ) -> Acceleration:
+        """Return q̈, θ̈ of (2) under the motor torque τ_m [N m] and what acts from outside.
 
-    def acceleration(self, x: RobotState, tau_m: cs.SX, tau_e: cs.SX, m: SimpleNamespace) -> Acceleration:
-        """Return q̈, θ̈ of (2) under the motor torque τ_m and the external joint torque τ_e [N m]."""
-        tau_a = self.joint_torque(x, m)
-        return Acceleration(
-            ddq=solve_spd(self.arm.mass_matrix(x.q, m), tau_a + tau_e - self.arm.bias_torque(x.q, x.dq, m)),
-            ddtheta=(tau_m - tau_a) / m.motor_inertia,
-            tau_a=tau_a,
-        )
+        Parameters
+        ----------
+        external: The joint torque τ_e (n,) [N m]; or the wrench on the end effector that makes it, which is cheaper.
+        """
+        tau_a, arm = self.joint_torque(x, m), self.arm
+        at_tip = external if isinstance(external, TipWrench) else None
+        driving = tau_a - arm.bias_torque(x.q, x.dq, m, at_tip) + (0 if at_tip else external)
+        ddq = solve_spd(arm.mass_matrix(x.q, m), driving)
+        return Acceleration(ddq, (tau_m - tau_a) / m.motor_inertia, tau_a)
 
 
 @lru_cache(maxsize=32)

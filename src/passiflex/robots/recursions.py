@@ -60,10 +60,9 @@ class Recursions:
         dq: cs.SX,
         gravity: cs.SX,
         *,
-        ddq: cs.SX | None = None,
         pushed: Wrench | None = None,
     ) -> cs.SX:
-        """Return M q̈ + C q̇ + ∇V − τ_e (n,) [N m], without the first or the last part if nothing is given for it.
+        """Return C q̇ + ∇V − τ_e (n,) [N m], with τ_e of what pushes the last link.
 
         Parameters
         ----------
@@ -73,13 +72,13 @@ class Recursions:
         spin, turning, falling = zero(), zero(), [-g for g in cs.vertsplit(gravity)]
         wrenches, frames = [], self.moved(q)
         for i, (frame, body) in enumerate(zip(frames, bodies, strict=True)):
-            rate, change = dq[i], cs.SX(0) if ddq is None else ddq[i]
+            rate = dq[i]
             falling = plus(falling, through(_rates(spin, turning), frame.origin))
             spin, turning, falling = (frame.inward(v) for v in (spin, turning, falling))
             if self.joints[i].slides:
-                falling = plus(falling, [2 * spin[1] * rate, -2 * spin[0] * rate, change])
+                falling = plus(falling, [2 * spin[1] * rate, -2 * spin[0] * rate, cs.SX(0)])
             else:
-                turning = [turning[0] + spin[1] * rate, turning[1] - spin[0] * rate, turning[2] + change]
+                turning = [turning[0] + spin[1] * rate, turning[1] - spin[0] * rate, turning[2]]
                 spin = [spin[0], spin[1], spin[2] + rate]
             wrenches.append(_inertial(body, _rates(spin, turning), falling))
         torque, carried = [cs.SX(0)] * len(frames), Wrench(zero(), zero())

@@ -98,17 +98,29 @@ def parse_scenario(text: str, source: str = "scenario", base_dir: str | Path | N
     ScenarioError
         With one line for each mistake: line, column, name, what is wrong and what to do.
     """
-    tree = Tree()
-    try:
-        data = tree.read(text, A_SCENARIO)
-    except RefusedText as error:
-        raise ScenarioError(source, [str(error)]) from None
-    if (other := of_another_kind(data, "scenario", source)) is not None:
-        raise ScenarioError(source, [other])
+    data, tree = read_tree(text, "scenario", A_SCENARIO, source)
     scenario = read_scenario(data, tree, (), base_dir)
     if tree.mistakes or scenario is None:
         raise ScenarioError(source, tree.lines())
     return scenario
+
+
+def read_tree(text: str, kind: str, needs: str, source: str) -> tuple[dict[str, Any], Tree]:
+    """Return the entries of a text, and where they stand in it.
+
+    Raises
+    ------
+    ScenarioError
+        If there are none, or they are those of another kind of file.
+    """
+    tree = Tree()
+    try:
+        data = tree.read(text, needs)
+    except RefusedText as error:
+        raise ScenarioError(source, [str(error)]) from None
+    if (other := of_another_kind(data, kind, source)) is not None:
+        raise ScenarioError(source, [other])
+    return data, tree
 
 
 def read_scenario(

@@ -25,6 +25,8 @@ _OFTEN, _TURNING = (
 )
 _UNIT = re.compile(r"(?:1\s*/)?(?:[A-Za-zµ°%/() ]|\^-?[1-9](?![0-9^.]))*")
 
+PER_SECOND = ("1/s", "s^-1")
+"""Units of SI for a speed of turning, which leaves rad out. Per any other time, data sheets count turns."""
 USUAL = {
     ("kHz", "Hz"): 1000.0,
     ("ms", "s"): 0.001,
@@ -163,7 +165,8 @@ def unit_factor(unit: str, wanted: str) -> float:
         raise ValueError(f"unknown unit {shown(unit)}")
     if (spelt, aim) in USUAL:
         return USUAL[spelt, aim]
-    if any(_often(a) and _TURNING.search(b) for a, b in ((spelt, aim), (aim, spelt))):
+    bare = aim == "rad/s" and not _TURNING.search(spelt) and spelt not in PER_SECOND
+    if bare or any(_often(a) and _TURNING.search(b) for a, b in ((spelt, aim), (aim, spelt))):
         raise ValueError(f"{unit}: of a frequency and a speed, one counts turns and the other radians")
     units = _registry()
     try:
