@@ -88,13 +88,7 @@ class ArgumentError(PassiflexError):
     """An argument is of another kind than what a function takes."""
 
     def __init__(self, got: object, needs: str, try_: str | None = None):
-        shown = repr(got)
-        super().__init__(
-            "wrong kind of argument",
-            got=shown if len(shown) <= 60 else f"{shown[:57]}...",
-            needs=needs,
-            try_=try_,
-        )
+        super().__init__("wrong kind of argument", got=shown(got), needs=needs, try_=try_)
 
 
 class SimulationError(PassiflexError):
@@ -112,6 +106,12 @@ class PassiflexWarning(UserWarning):
 def nearest(name: str, known: Iterable[str]) -> list[str]:
     """Return up to three known names that are close to `name`, best first."""
     return difflib.get_close_matches(name, list(known), n=3, cutoff=0.5) if len(name) <= _LONGEST_NAME else []
+
+
+def shown(value: object) -> str:
+    """Return the value as evidence, on one line and not long."""
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."
 
 
 def _bearable(part: str) -> str:

@@ -109,6 +109,13 @@ def test_a_frequency_is_no_speed(wanted, unit):
         Quantity(wanted).convert(f"1 {unit}")
 
 
+def test_si_may_leave_rad_out_and_another_dimension_is_said_as_that():
+    assert [Quantity("rad/s").convert(f"3 {unit}") for unit in ("1/s", "s⁻¹", "rad/s")] == [3.0] * 3
+    for other in ("m/s", "N m"):
+        with pytest.raises(ValueError, match=rf"\({other}\)"):
+            Quantity("rad/s").convert(f"3 {other}")
+
+
 @pytest.mark.parametrize("milli", [1, 3, 5, 7, 9, 29, 57])
 def test_a_conversion_rounds_as_if_si_had_been_written(milli):
     assert Quantity("s").convert(f"{milli} ms") == float(f"{milli}e-3")

@@ -11,6 +11,7 @@ from typing import Any
 from pydantic import GetCoreSchemaHandler
 from pydantic_core import CoreSchema, core_schema
 
+from passiflex.errors import shown as shown
 from passiflex.texts.unit_spelling import spelt_out
 
 Numbers = float | tuple["Numbers", ...]
@@ -25,6 +26,7 @@ _OFTEN, _TURNING = (
 )
 _UNIT = re.compile(r"(?:1\s*/)?(?:[A-Za-zµ°%/() ]|\^-?[1-9](?![0-9^.]))*")
 
+_PER_TIME = re.compile(r"1\s*/\s*[A-Za-zµ]+|[A-Za-zµ]+\^-1")
 PER_SECOND = ("1/s", "s^-1")
 """Units of SI for a speed of turning, which leaves rad out. Per any other time, data sheets count turns."""
 USUAL = {
@@ -165,7 +167,7 @@ def unit_factor(unit: str, wanted: str) -> float:
         raise ValueError(f"unknown unit {shown(unit)}")
     if (spelt, aim) in USUAL:
         return USUAL[spelt, aim]
-    bare = aim == "rad/s" and not _TURNING.search(spelt) and spelt not in PER_SECOND
+    bare = aim == "rad/s" and _PER_TIME.fullmatch(spelt) and spelt not in PER_SECOND
     if bare or any(_often(a) and _TURNING.search(b) for a, b in ((spelt, aim), (aim, spelt))):
         raise ValueError(f"{unit}: of a frequency and a speed, one counts turns and the other radians")
     units = _registry()
@@ -227,9 +229,3 @@ def _shape_words(shape: tuple[int | None, ...]) -> str:
 
 def _either(words: list[str]) -> str:
     return " or ".join(filter(None, [", ".join(words[:-1]), words[-1]]))
-
-
-def shown(value: Any) -> str:
-    """Return the value as evidence, on one line and not long."""
-    shown = repr(value)
-    return shown if len(shown) <= 60 else shown[:57] + "..."
