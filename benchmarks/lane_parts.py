@@ -174,8 +174,14 @@ def native_seconds(problem: Problem, periods: int) -> float:
     told = [Change(o.first, lane, o.numbers) for o in orders(problem, row)[:1] for lane in range(lanes.width)]
     inputs = LaneInputs(0, told, *(np.repeat(a[..., None], lanes.width, axis=-1) for a in (drawn, timing)))
     state = lanes.start([start(problem, compiled)] * lanes.width)
-    numbers = (np.repeat(p[:, None], lanes.width, axis=1) for p in (s.plant, s.numbers))
+    numbers = [np.repeat(p[:, None], lanes.width, axis=1) for p in (s.plant, s.numbers)]
     longest = np.full(lanes.width, longest_step(problem, compiled.plant))
     every = round(problem.output_interval / s.period)
-    kept = np.arange(100)
-    return cpu_seconds(lanes.advance, state, inputs, *numbers, s.period, longest, kept, every) / periods
+    kept, robot = np.arange(100), problem.law.robot
+    watched = np.concatenate([s.numbers, compiled.loop.witness.numbers(robot, problem.tank.initial)])
+    p_watch = np.repeat(watched[:, None], lanes.width, axis=1)
+
+    def advance() -> None:
+        lanes.advance(state, inputs, *numbers, s.period, longest, kept, every, p_watch=p_watch)
+
+    return cpu_seconds(advance) / periods
