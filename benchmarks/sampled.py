@@ -36,7 +36,9 @@ def in_machine(problem: Problem, seconds: float) -> None:
     loop = HeldLoop(compiled.loop.plant.rhs, compiled.loop.control)
     rows, timing = Rows(problem, compiled.loop.period, compiled.row).take(0, round(seconds / s.period))
     longest = longest_step(problem, compiled.plant)
-    loop.advance(start(problem, compiled), rows, timing, s.plant, s.numbers, s.period, longest)
+    begin = start(problem, compiled)
+    unwatched = loop.start(begin.x, begin.controller, s.held)
+    loop.advance(unwatched, rows, timing, s.plant, s.numbers, s.period, longest)
 
 
 def compiled_from_python(problem: Problem, seconds: float) -> None:
