@@ -27,7 +27,7 @@ from other_ways import alternatives
 from passiflex.campaigns import draws, parse_campaign, sample_scenario
 from passiflex.campaigns.evaluate import evaluate_samples
 from passiflex.campaigns.measures import SIGNALS, measures
-from passiflex.pieces.engines import LocalProcesses
+from passiflex.chunks.engines import LocalProcesses
 from passiflex.responses.steps import step_window
 from passiflex.simulation import Problem, resolve, simulate_problem
 from passiflex.simulation.batch import lane_loop, simulate_batch

@@ -19,7 +19,7 @@ RUNS = 2
 
 
 def timed(name: str, work: Callable[[], object]) -> float:
-    """Print and return the CPU seconds of a piece of work, and how many radii it took."""
+    """Print and return the CPU seconds of a chunk of work, and how many radii it took."""
     radii = 0
     matrix = LinearLoop.matrix
 

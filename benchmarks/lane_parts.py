@@ -20,7 +20,7 @@ from passiflex.native import Change, LaneInputs
 from passiflex.native.lane_source import lane_source
 from passiflex.simulation import Problem
 from passiflex.simulation.batch import lane_loop
-from passiflex.simulation.rows import Chance, Rows, orders
+from passiflex.simulation.schedule import Chance, PeriodRows, schedule
 from passiflex.simulation.simulate_sampled import longest_step, start
 
 Array = NDArray[np.float64]
@@ -62,18 +62,18 @@ def parts_of(problem: Problem) -> list[Part]:
     compiled = compiled_sampled_loop(s.loop)
     loop, rng = compiled.loop, np.random.default_rng(0)
     state = start(problem, compiled)
-    row, _ = Rows(problem, loop.period, compiled.row).take(0, 1)
+    row, _ = PeriodRows(problem, loop.period, compiled.row).take(0, 1)
     n = problem.law.robot.n
     x = state.x + np.concatenate([np.zeros(n), *(rng.normal(0, s, n) for s in (1e-4, 0.1, 0.1))])
-    surroundings = row[0][: loop.plant.rhs.size1_in(1) - n]
-    u = np.concatenate([s.held, surroundings])
+    environment = row[0][: loop.plant.rhs.size1_in(1) - n]
+    u = np.concatenate([s.held, environment])
     chance = rng.normal(0, 0.1, loop.period.function.size1_in(2))
     told = rng.uniform(0.1, 0.5, loop.period.function.size1_in(1))
     return [
         Part("plant", loop.plant.rhs, [x, u, s.plant]),
         Part("control", loop.control, [x, state.controller, row[0], s.numbers]),
         Part("row", loop.period.function, [np.ones(1), told, chance]),
-        Part("truth", loop.outputs, [x, s.held, surroundings, s.numbers]),
+        Part("truth", loop.outputs, [x, s.held, environment, s.numbers]),
     ]
 
 
@@ -171,7 +171,9 @@ def native_seconds(problem: Problem, periods: int) -> float:
     compiled = compiled_sampled_loop(s.loop)
     row = compiled.loop.period
     drawn, timing = Chance(problem, row).take(0, periods)
-    told = [Change(o.first, lane, o.numbers) for o in orders(problem, row)[:1] for lane in range(lanes.width)]
+    told = [
+        Change(o.first, lane, o.numbers) for o in schedule(problem, row)[:1] for lane in range(lanes.width)
+    ]
     inputs = LaneInputs(0, told, *(np.repeat(a[..., None], lanes.width, axis=-1) for a in (drawn, timing)))
     state = lanes.start([start(problem, compiled)] * lanes.width)
     numbers = [np.repeat(p[:, None], lanes.width, axis=1) for p in (s.plant, s.numbers)]

@@ -87,7 +87,7 @@ CODE = {16 << 10: "code_16k", 48 << 10: "code_48k", 256 << 10: "code_256k"}
 class Rates(NamedTuple):
     """Instructions per second of one core, each on one vector of `lanes` doubles.
 
-    `cycles` is its clock [Hz]; `code` by size of a straight piece of code [byte] how fast it comes [byte/s],
+    `cycles` is its clock [Hz]; `code` by size of a straight chunk of code [byte] how fast it comes [byte/s],
     empty where that is not measured.
     """
 
@@ -100,7 +100,7 @@ class Rates(NamedTuple):
     code: dict[int, float]
 
     def fetched(self, size: int) -> float:
-        """Return how fast code of this size comes [byte/s]: as the piece that was measured nearest to it in size."""
+        """Return how fast code of this size comes [byte/s]: as the chunk that was measured nearest to it in size."""
         if not self.code:
             return float("inf")
         return self.code[min(self.code, key=lambda known: abs(math.log(known / size)))]

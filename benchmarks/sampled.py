@@ -16,7 +16,7 @@ from rich.table import Table
 from passiflex.loops.compiled import CompiledSampledLoop, compiled_sampled_loop
 from passiflex.native import HeldLoop, NativeFunction
 from passiflex.simulation import Problem, simulate_problem
-from passiflex.simulation.rows import Rows
+from passiflex.simulation.schedule import PeriodRows
 from passiflex.simulation.simulate_sampled import longest_step, start
 from speed import Row, by_turns, machine, median_times, problem_of
 
@@ -34,7 +34,7 @@ def in_machine(problem: Problem, seconds: float) -> None:
     s, compiled = problem.sampling, compiled_of(problem)
     assert s is not None
     loop = HeldLoop(compiled.loop.plant.rhs, compiled.loop.control)
-    rows, timing = Rows(problem, compiled.loop.period, compiled.row).take(0, round(seconds / s.period))
+    rows, timing = PeriodRows(problem, compiled.loop.period, compiled.row).take(0, round(seconds / s.period))
     longest = longest_step(problem, compiled.plant)
     begin = start(problem, compiled)
     unwatched = loop.start(begin.x, begin.controller, s.held)
@@ -46,7 +46,7 @@ def compiled_from_python(problem: Problem, seconds: float) -> None:
     s, compiled = problem.sampling, compiled_of(problem)
     assert s is not None
     count = round(seconds / s.period)
-    rows, _ = Rows(problem, compiled.loop.period, compiled.row).take(0, count)
+    rows, _ = PeriodRows(problem, compiled.loop.period, compiled.row).take(0, count)
     steps = int(np.ceil(s.period / longest_step(problem, compiled.plant)))
     h, state = s.period / steps, start(problem, compiled)
     x, memory, held = state.x, state.controller, s.held
@@ -73,7 +73,7 @@ def main() -> None:
     )
     parser.add_argument("--quick", action="store_true", help="fewer repeats and shorter pieces")
     quick = parser.parse_args().quick
-    repeats, piece = (3, 0.05) if quick else (7, 0.2)
+    repeats, chunk = (3, 0.05) if quick else (7, 0.2)
     console = Console(width=150)
     console.print(machine(), highlight=False)
     problem = problem_of("fig1_sampled")
@@ -84,10 +84,10 @@ def main() -> None:
         repeats,
         lambda: simulate_problem(problem),
         lambda: simulate_problem(coarse),
-        lambda: compiled_from_python(problem, piece),
-        lambda: in_machine(problem, piece),
+        lambda: compiled_from_python(problem, chunk),
+        lambda: in_machine(problem, chunk),
     )
-    scale = problem.duration / piece
+    scale = problem.duration / chunk
     x, c, row = (np.tile(v, (2000, 1)) for v in _point(problem, compiled))
     u = np.tile(np.concatenate([problem.sampling.held, np.zeros(compiled.held.n_s)]), (2000, 1))
     rows = [
@@ -108,14 +108,14 @@ def main() -> None:
     steps = int(np.ceil(problem.sampling.period / longest_step(problem, compiled.plant)))
     console.print(
         f"- {steps} plant steps of order 4 per period; the controller has {compiled.loop.control.n_instructions()} "
-        f"instructions, the plant {compiled.loop.plant.rhs.n_instructions()}; alternatives scaled from {piece:g} s",
+        f"instructions, the plant {compiled.loop.plant.rhs.n_instructions()}; alternatives scaled from {chunk:g} s",
         highlight=False,
     )
 
 
 def _point(problem: Problem, compiled: CompiledSampledLoop) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     state = start(problem, compiled)
-    rows, _ = Rows(problem, compiled.loop.period, compiled.row).take(0, 1)
+    rows, _ = PeriodRows(problem, compiled.loop.period, compiled.row).take(0, 1)
     return state.x, state.controller, rows[0]
 
 

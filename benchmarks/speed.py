@@ -28,7 +28,7 @@ from rich.console import Console
 from rich.table import Table
 
 import plain
-from passiflex.loops.motion import MOTION
+from passiflex.control.motion import MOTION
 from passiflex.native import DRIVER, NativeFunction, find_compiler, library
 from passiflex.simulation import (
     CompiledLoop,
@@ -258,14 +258,14 @@ def fig1_rows(problem: Problem, repeats: int) -> tuple[list[Row], str]:
 
 
 def fig3_rows(problem: Problem, ours_for: float, plain_for: float, repeats: int) -> tuple[list[Row], str]:
-    """Compare short pieces from the start, both scaled to one simulated second."""
+    """Compare short chunks from the start, both scaled to one simulated second."""
 
-    def piece(duration: float, interval: float) -> Problem:
+    def chunk(duration: float, interval: float) -> Problem:
         return dataclasses.replace(
             problem, duration=duration, output_interval=interval, events=problem.events[:1]
         )  # the noise is drawn period by period: a shorter run sees the same
 
-    long, short = piece(ours_for, problem.output_interval), piece(plain_for, 1e-3)
+    long, short = chunk(ours_for, problem.output_interval), chunk(plain_for, 1e-3)
     ours, bdf, lsoda = np.array(
         median_times(
             repeats,

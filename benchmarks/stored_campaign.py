@@ -89,7 +89,7 @@ def stored(console: Console, samples: int) -> None:
     table = Table("1000 robots × 30 s, two processes, stored", "", "asked", "met")
     said = "measured" if samples == 1000 else f"from {samples} measured in {whole:.1f} s"
     table.add_row("time on the wall", f"{thousand:.0f} s, {said}")
-    table.add_row("  first two pieces done after", f"{first_at:.0f} s")
+    table.add_row("  first two chunks done after", f"{first_at:.0f} s")
     table.add_row(
         "  robot-s per s from there on", f"{steady * 30:.0f}", f"≥ {TWO_CORES:g}",
         "yes" if steady * 30 >= TWO_CORES else "NO",

@@ -12,8 +12,8 @@ from scipy.spatial.transform import Rotation
 from arms import serial_chains
 from passiflex.control import AbstractLaw, EnergyTank
 from passiflex.control.inner_loop import shaped_motion
+from passiflex.control.motion import reference_at
 from passiflex.control.tank import NO_CAP
-from passiflex.loops.motion import reference_at
 from passiflex.robots.arm import SerialArm
 from passiflex.robots.chain import SerialChain
 from passiflex.robots.flexible import FlexibleJointRobot

@@ -27,9 +27,9 @@ ROOMS = (
     "passivity",
     "responses",
     "limits",
-    "pieces",
+    "chunks",
     "campaigns",
-    "views",
+    "diagrams",
     "plotting",
     "reports",
     "exports",
@@ -38,7 +38,7 @@ ROOMS = (
 )
 """A room imports from itself and from the rooms before it."""
 
-ONLY = {"native": FOUNDATION, "pieces": (*FOUNDATION, "texts")}
+ONLY = {"native": FOUNDATION, "chunks": (*FOUNDATION, "texts")}
 """What a room may import when that is less than the order allows: both know nothing of robots and laws."""
 
 DRAWN_BY = ("plotting", "reports", "studies", "cli")

@@ -92,10 +92,10 @@ def picture(target: Path, run: Run, baseline: Run | None = None, until: float | 
     baseline: The rigid baseline to draw beside it.
     until: The end of the picture [s]; that of the run if None.
     """
+    from passiflex.diagrams import Viewed, ideal_motion
     from passiflex.plotting.files import save_as
     from passiflex.plotting.run import draw_run
     from passiflex.simulation import Run
-    from passiflex.views import Viewed, ideal_motion
 
     shown = Run(run.data.sel(time=slice(0.0, until)))
     others = [] if baseline is None else [Viewed(baseline, "rigid baseline")]

@@ -6,8 +6,8 @@
     print(pf.audit(run).verdict)
 
 The rooms, in the order in which they may import each other: `texts`, `robots`, `phs`, `control`, `sampled`, `native`;
-`scenarios`, `loops`, `problems`, `stability`, `runs`, `simulation`; `passivity`, `responses`, `limits`, `pieces`,
-`campaigns`; then what looks at their results: `views`, `plotting`, `reports`, `exports`; then `studies`, `cli`.
+`scenarios`, `loops`, `problems`, `stability`, `runs`, `simulation`; `passivity`, `responses`, `limits`, `chunks`,
+`campaigns`; then what looks at their results: `diagrams`, `plotting`, `reports`, `exports`; then `studies`, `cli`.
 """
 
 from __future__ import annotations

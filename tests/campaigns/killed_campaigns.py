@@ -21,7 +21,7 @@ import numpy as np
 
 from campaigns.small_campaigns import SAMPLED, STIFFNESS, campaign, uniform
 from passiflex.campaigns import Results, run_campaign
-from passiflex.pieces.run_pieces import PieceError, Progress
+from passiflex.chunks.run_chunks import ChunkError, Progress
 
 LONGEST = {"parent": 0.4, "family": 5.0}
 """Latest moment of the first kill [s]."""
@@ -67,7 +67,7 @@ def killed_workers(folder: Path, rng: np.random.Generator) -> int:
             killed += 1
 
     while True:
-        with suppress(PieceError):  # one of its calls cost as many workers as a call may
+        with suppress(ChunkError):  # one of its calls cost as many workers as a call may
             run(folder, workers=2, on_progress=kill_one)
             return killed
 

@@ -169,7 +169,7 @@ U01 = "{distribution: uniform, low: 0, high: 1}"
         ("control.delay: {distribution: choice, values: 0}", "column 49, parameters.'control.delay'.values: expected a list; got 0"),
         ("control.delay: {distribution: choice, values: [0, 1 Hz]}", "column 53, parameters.'control.delay'.values[1]: expected s, one number; got '1 Hz' (Hz)"),
         ("control.inner_loop: {distribution: choice, values: [plain, mached]}", "column 62, parameters.'control.inner_loop'.values[1]: unknown word 'mached'; try 'matched'"),
-        ("control.insist: {distribution: choice, values: [true, 3]}", "column 57, parameters.'control.insist'.values[1]: expected true or false; got 3"),
+        ("control.allow_unstable: {distribution: choice, values: [true, 3]}", "column 65, parameters.'control.allow_unstable'.values[1]: expected true or false; got 3"),
         (f"control.inner_loop: {U01}", "column 38, parameters.'control.inner_loop'.distribution: control.inner_loop is a word; take distribution: choice"),
         ("posture: {distribution: uniform, low: 0, high: 1}", "column 12, parameters.posture: is a list of numbers; add per: joint, or which one of them: posture.1"),
         ("control.delay: {distribution: uniform, low: 0, high: 0.001, per: joint}", "column 68, parameters.'control.delay'.per: control.delay has one value, not one per joint; remove it"),

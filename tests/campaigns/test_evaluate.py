@@ -47,9 +47,12 @@ LATE = {
 CAMPAIGNS: dict[str, Campaign] = {
     "sampled": campaign(),
     "continuous": campaign(CONTINUOUS, samples=3),
-    "unstable": campaign(merged(UNSTABLE, {"control": {"insist": True}}), samples=3),
+    "unstable": campaign(merged(UNSTABLE, {"control": {"allow_unstable": True}}), samples=3),
     "words": campaign(
-        parameters={"control.external_torque": choice("none", "true"), "control.insist": choice(True, False)}
+        parameters={
+            "control.external_torque": choice("none", "true"),
+            "control.allow_unstable": choice(True, False),
+        }
     ),
     "rates": campaign(parameters={"control.rate": choice(200, 400), "duration": uniform(0.45, 0.7)}),
     "response": campaign(keep={"response": 0.05}),
@@ -84,12 +87,12 @@ def test_words_are_words() -> None:
     c = CAMPAIGNS["words"]
     found = rows(c)
     assert {row["control.external_torque"] for row in found} == {"none", "true"}
-    assert {row["control.insist"] for row in found} <= {"true", "false"}
+    assert {row["control.allow_unstable"] for row in found} <= {"true", "false"}
     for i, row in enumerate(found):
         control = sample_scenario(c, i).control
         assert control is not None
         assert row["control.external_torque"] == control.external_torque
-        assert row["control.insist"] == str(control.insist).lower()
+        assert row["control.allow_unstable"] == str(control.allow_unstable).lower()
 
 
 @pytest.mark.parametrize("name", CAMPAIGNS)
@@ -207,7 +210,7 @@ def test_the_response_of_a_run_that_ended_early() -> None:
     wild = merged(
         UNSTABLE,
         {
-            "control": {"insist": True},
+            "control": {"allow_unstable": True},
             "tank": {"kind": "paper"},
             "law": {"shaped_stiffness": {"ratio": 10}},
         },

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from campaigns.killed_campaigns import SAMPLES, run
+from chunks.cheap_campaign import ENVIRONMENT
+from chunks.dask_processes import scheduler, wait_for_workers, worker
+from passiflex.chunks.run_chunks import Progress
 from passiflex.errors import PassiflexError
-from passiflex.pieces.run_pieces import Progress
-from pieces.cheap_campaign import ENVIRONMENT
-from pieces.dask_processes import scheduler, wait_for_workers, worker
 
 pytestmark = pytest.mark.slow
 

@@ -31,7 +31,7 @@ SAMPLED: dict[str, Any] = {
     "output_interval": 0.01,
     "duration": 2.5,
 }
-UNSTABLE = {"control": {"insist": True}, "law": {"shaped_inertia": {"ratio": 0.2}}}
+UNSTABLE = {"control": {"allow_unstable": True}, "law": {"shaped_inertia": {"ratio": 0.2}}}
 WORLDS: dict[str, dict[str, Any]] = {
     "sampled": SAMPLED,
     "no step": merged(SAMPLED, {"reference": []}),

@@ -37,6 +37,10 @@ from passiflex.campaigns import (
 from passiflex.campaigns.evaluate import evaluate_samples
 from passiflex.campaigns.measures import measures
 from passiflex.campaigns.run_campaign import worst
+from passiflex.chunks.manifest import FolderError
+from passiflex.chunks.run_chunks import Progress
+from passiflex.chunks.store import open_store
+from passiflex.chunks.worker import EngineError
 from passiflex.errors import (
     NameUnknownError,
     PassiflexError,
@@ -45,10 +49,6 @@ from passiflex.errors import (
     ValueRangeError,
 )
 from passiflex.files import OutputError
-from passiflex.pieces.manifest import FolderError
-from passiflex.pieces.run_pieces import Progress
-from passiflex.pieces.store import open_store
-from passiflex.pieces.worker import EngineError
 from passiflex.responses.steps import step_window
 from passiflex.simulation import Run, batch, resolve
 from worlds import merged
@@ -58,15 +58,19 @@ TESTS = Path(__file__).parents[1]
 ENVIRONMENT = os.environ | {"PYTHONPATH": os.pathsep.join([str(TESTS.parent / "src"), str(TESTS)])}
 WILD: dict[str, Any] = merged(
     UNSTABLE,
-    {"control": {"insist": True}, "tank": {"kind": "paper"}, "law": {"shaped_stiffness": {"ratio": 1}}},
+    {
+        "control": {"allow_unstable": True},
+        "tank": {"kind": "paper"},
+        "law": {"shaped_stiffness": {"ratio": 1}},
+    },
 )
 """Unstable and not caught by a fallback; stiffer joints leave the finite numbers."""
 
 
 @pytest.fixture(autouse=True)
-def small_pieces(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let a few samples be several pieces: the size of a piece has no part in the rows."""
-    monkeypatch.setattr(module, "open_store", partial(open_store, piece=4))
+def small_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let a few samples be several chunks: the size of a chunk has no part in the rows."""
+    monkeypatch.setattr(module, "open_store", partial(open_store, chunk=4))
 
 
 @lru_cache
@@ -115,7 +119,7 @@ def test_results_are_read_from_their_folder(serial: Results) -> None:
     assert right(again)
 
 
-def test_progress_counts_every_piece(tmp_path: Path) -> None:
+def test_progress_counts_every_chunk(tmp_path: Path) -> None:
     seen: list[Progress] = []
     run_campaign(MANY, tmp_path / "out", workers=0, on_progress=seen.append)
     assert [(p.done, p.total) for p in seen] == [(4, 14), (8, 14), (12, 14), (14, 14)]
@@ -139,16 +143,16 @@ import sys, time
 from functools import partial
 from importlib import import_module
 from campaigns.small_campaigns import campaign
-from passiflex.pieces.store import open_store
+from passiflex.chunks.store import open_store
 module = import_module("passiflex.campaigns.run_campaign")
-module.open_store = partial(open_store, piece=4)
+module.open_store = partial(open_store, chunk=4)
 many = campaign(samples=14, keep={"response": 0.1})
 module.run_campaign(many, sys.argv[1], workers=0, on_progress=lambda p: time.sleep(60 * (p.done >= 8)))
 """
 
 
 def test_a_campaign_that_was_killed_goes_on(serial: Results, tmp_path: Path) -> None:
-    """Two pieces are there; the file in the end is the same."""
+    """Two chunks are there; the file in the end is the same."""
     folder = tmp_path / "out"
     with subprocess.Popen([sys.executable, "-c", SLOW, folder], env=ENVIRONMENT, cwd=tmp_path) as process:
         end = time.monotonic() + 60
@@ -327,12 +331,12 @@ def refused(error: type[PassiflexError], match: str, c: Campaign, folder: Path, 
 
 
 def test_an_unstable_loop_is_refused_before_the_start(tmp_path: Path) -> None:
-    remedy = r"remedy: B_e of .*; or control\.insist"
+    remedy = r"remedy: B_e of .*; or control\.allow_unstable"
     refused(UnstableLoopError, remedy, campaign(UNSTABLE), tmp_path / "out")
 
 
 def test_an_unstable_loop_that_is_insisted_on_runs(tmp_path: Path) -> None:
-    insistent = campaign(merged(UNSTABLE, {"control": {"insist": True}}), samples=2)
+    insistent = campaign(merged(UNSTABLE, {"control": {"allow_unstable": True}}), samples=2)
     assert {row["verdict"] for row in table(run_campaign(insistent, tmp_path / "out", workers=0))} == {
         "violated"
     }

@@ -12,9 +12,9 @@ from campaigns.small_campaigns import SAMPLED, STIFFNESS, campaign, uniform
 from passiflex.campaigns import Campaign, replay, run_campaign
 from passiflex.campaigns.evaluate import evaluate_samples
 from passiflex.campaigns.same_robot import OtherRobotError, marked, require_same_robot, robot_digest
+from passiflex.chunks.manifest import FolderError
+from passiflex.chunks.run_chunks import ChunkError
 from passiflex.errors import PassiflexError
-from passiflex.pieces.manifest import FolderError
-from passiflex.pieces.run_pieces import PieceError
 from worlds import merged
 
 EXAMPLES = Path(__file__).parents[2] / "docs" / "examples"
@@ -25,7 +25,11 @@ def of_a_file(tmp_path: Path) -> Campaign:
     """Return a campaign of two samples whose robot is a file of its own."""
     for name in ("arm3.yaml", "arm3.urdf"):
         shutil.copy(EXAMPLES / name, tmp_path)
-    own = {"robot": str(tmp_path / "arm3.yaml"), "posture": [0, 0.7, -1.4], "control": {"insist": True}}
+    own = {
+        "robot": str(tmp_path / "arm3.yaml"),
+        "posture": [0, 0.7, -1.4],
+        "control": {"allow_unstable": True},
+    }
     scenario = merged(SAMPLED, own)
     return campaign(scenario, samples=2, parameters={STIFFNESS: uniform(-0.1, 0.1)})
 
@@ -81,5 +85,5 @@ def test_a_robot_that_changes_in_flight_ends_the_campaign(
         "passiflex.campaigns.run_campaign"
     )  # the name is that of its function, too
     monkeypatch.setattr(module, "evaluate_samples", changing)
-    with pytest.raises(PieceError, match="is not what it was"):
+    with pytest.raises(ChunkError, match="is not what it was"):
         run_campaign(of_a_file, tmp_path / "out", workers=0)

@@ -25,7 +25,7 @@ CAMPAIGN = Campaign(
         "law.stiffness.translation": {"distribution": "uniform", "low": "10 N/m", "high": "60 N/m"},
         "control.delay": {"distribution": "choice", "values": ["0 ms", "1 ms"]},
         "control.inner_loop": {"distribution": "choice", "values": ["plain", "matched"]},
-        "control.insist": {"distribution": "choice", "values": [True, False]},
+        "control.allow_unstable": {"distribution": "choice", "values": [True, False]},
         "forces.1.force.3": {"distribution": "normal", "mean": 0, "deviation": 2},
         "motors.coulomb_friction.2": {"distribution": "uniform", "low": 0, "high": 1},
         "motors.coulomb_friction.5": {"distribution": "uniform", "low": 0, "high": 1},
@@ -45,7 +45,7 @@ def test_a_sample_has_its_values_in_place(index):
     assert s.law.shaped_inertia.ratio == (*own[:5], row[7], *own[6:])
     np.testing.assert_array_equal(s.law.stiffness.translation, row[8] * np.eye(3))
     assert (s.control.delay, s.control.inner_loop) == (row[9], ("plain", "matched")[int(row[10])])
-    assert s.control.insist is (row[11] == 0.0)
+    assert s.control.allow_unstable is (row[11] == 0.0)
     assert s.forces[0].force == (0.0, 4.0, row[12])
     assert s.motors.coulomb_friction == (0.0, row[13], 0.0, 0.0, row[14], 0.0, 0.0)
     assert s.actions.follow_velocity == row[15]

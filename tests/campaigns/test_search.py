@@ -168,7 +168,7 @@ def test_a_case_insists_where_its_loop_is_unstable_only() -> None:
     found = searched("torque_peak", parameters=parameters, keep=10)
     assert all(c.scenario.control for c in found.cases)
     insists = {
-        float(c.values["law.shaped_inertia.ratio"]): c.scenario.control.insist  # type: ignore[arg-type,union-attr]
+        float(c.values["law.shaped_inertia.ratio"]): c.scenario.control.allow_unstable  # type: ignore[arg-type,union-attr]
         for c in found.cases
     }
     assert insists == {ratio: ratio < 0.67 for ratio in insists}

@@ -15,8 +15,8 @@ from campaigns.small_campaigns import SAMPLED, UNSTABLE, campaign
 from cli.shell import Result, Shell
 from passiflex.campaigns import Results, sample_scenario
 from passiflex.campaigns.measures import measures
+from passiflex.chunks.run_chunks import Progress
 from passiflex.cli import campaign_commands, terminal
-from passiflex.pieces.run_pieces import Progress
 from passiflex.responses.steps import step_window
 from passiflex.simulation import Run, resolve
 from worlds import merged
@@ -84,7 +84,11 @@ def test_a_replay_has_the_numbers_of_its_row(shell: Shell, small: Path, tmp_path
 def test_a_replay_that_ends_early_says_so_with_status_2(shell: Shell, tmp_path: Path) -> None:
     wild = merged(
         UNSTABLE,
-        {"control": {"insist": True}, "tank": {"kind": "paper"}, "law": {"shaped_stiffness": {"ratio": 10}}},
+        {
+            "control": {"allow_unstable": True},
+            "tank": {"kind": "paper"},
+            "law": {"shaped_stiffness": {"ratio": 10}},
+        },
     )
     (tmp_path / "c.yaml").write_text(campaign(wild, samples=1).to_yaml())
     ran = shell("campaign", tmp_path / "c.yaml", "--workers", 0, "--out", tmp_path / "out")
@@ -134,7 +138,7 @@ def test_what_campaign_refuses(shell: Shell, small: Path, tmp_path: Path) -> Non
         (
             "unstable.yaml",
             (),
-            "the law of 'planar' does not hold\n  cause: .*\n  number: .*\n  remedy: .*control.insist: true",
+            "the law of 'planar' does not hold\n  cause: .*\n  number: .*\n  remedy: .*control.allow_unstable: true",
         ),
         ("small.yaml", ("--workers", -1), "number of worker processes; got -1; needs ≥ 1"),
         ("small.yaml", ("--samples", 0), "number of samples; got 0; needs 1 to 1000000"),
@@ -201,7 +205,7 @@ def test_help_says_what_the_options_do(shell: Shell, command: str) -> None:
 def test_the_lines_of_a_sampled_campaign_name_it(shell: Shell, tmp_path: Path) -> None:
     """Every verdict is counted."""
     c = campaign(
-        merged(SAMPLED, {"control": {"insist": True}}),
+        merged(SAMPLED, {"control": {"allow_unstable": True}}),
         samples=4,
         parameters={"law.shaped_inertia.ratio": {"distribution": "choice", "values": [0.2, 1]}},
     )

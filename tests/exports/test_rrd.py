@@ -14,6 +14,7 @@ from rerun.chunk import RrdReader
 from rerun.error_utils import RerunWarning
 from scipy.spatial.transform import Rotation
 
+from passiflex.diagrams import KINDS, Viewed, ideal_motion, panels
 from passiflex.exports import export_run
 from passiflex.exports.signals import signals_of
 from passiflex.passivity import audit
@@ -21,7 +22,6 @@ from passiflex.robots.frames import world_frames
 from passiflex.robots.solids import solids, with_solids
 from passiflex.runs.run_arm import chain_of
 from passiflex.simulation import Run
-from passiflex.views import KINDS, Viewed, ideal_motion, panels
 
 Columns = dict[str, dict[str, Any]]
 SINGLE = 2.0**-23

@@ -42,7 +42,7 @@ def regulator():
     return cs.Function("regulator", [x, c, row, p], [after, command, cs.vertcat(c[1:], command)])
 
 
-class Told(NamedTuple):
+class Scheduled(NamedTuple):
     rows: np.ndarray
     timing: np.ndarray
 
@@ -52,7 +52,7 @@ def told(count, delay, missed=0.0, seed=5):
     rng = np.random.default_rng(seed)
     delays = delay * PERIOD * (rng.random(count) if isinstance(delay, np.ndarray) else np.ones(count))
     runs = (rng.random(count) >= missed).astype(float)
-    return Told(rng.uniform(-1, 1, (count, 4)), np.column_stack([delays, runs]))
+    return Scheduled(rng.uniform(-1, 1, (count, 4)), np.column_stack([delays, runs]))
 
 
 def run(loop, t, longest=PERIOD, state=None, gains=GAINS, **how):

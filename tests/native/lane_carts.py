@@ -21,7 +21,7 @@ def period_row() -> cs.Function:
 
 
 def truth() -> cs.Function:
-    """Return (x, command, surroundings, p) → the force, the distance to the start, the first gain."""
+    """Return (x, command, environment, p) → the force, the distance to the start, the first gain."""
     x, u, s, p = cs.SX.sym("x", 4), cs.SX.sym("u", 2), cs.SX.sym("s", 2), cs.SX.sym("p", 3)
     return cs.Function("truth", [x, u, s, p], [cs.vertcat(u + s, cs.norm_2(x[:2] - START[:2]), p[0])])
 
@@ -81,13 +81,13 @@ def side_by_side(
     loop: LaneLoop,
     robots: Sequence[Robot],
     count: int = 40,
-    pieces: Sequence[int] = (),
+    chunks: Sequence[int] = (),
     *,
     last: bool = False,
     record_every: int = 1,
     kept: np.ndarray | None = None,
 ) -> tuple[np.ndarray, list[LaneSamples]]:
-    """Return all that was recorded (samples, numbers, lanes), and what came of each piece."""
+    """Return all that was recorded (samples, numbers, lanes), and what came of each chunk."""
     held = HeldLoop(_like(loop), regulator())
     state = loop.start([held.start(r.begin, np.zeros(3), FIRST_COMMAND) for r in robots])
     drawn, timing = (np.stack(part, axis=-1) for part in zip(*(r.chance(count) for r in robots), strict=True))
@@ -96,7 +96,7 @@ def side_by_side(
     longest = np.array([r.longest for r in robots])
     kept = np.arange(loop.instant["row"].stop) if kept is None else kept
     parts, first = [], 0
-    for size in pieces or (count,):
+    for size in chunks or (count,):
         here = slice(first, first + size)
         changes = [c for c in told if first <= c.period < first + size]
         inputs = LaneInputs(first, changes, drawn[here], timing[here])

@@ -12,7 +12,7 @@ from native.carts import (
     MASS,
     PERIOD,
     START,
-    Told,
+    Scheduled,
     cart,
     pendulum,
     regulator,
@@ -128,14 +128,14 @@ def test_native_equals_machine(library):
     np.testing.assert_allclose(ours.state.x, theirs.state.x, rtol=1e-13, atol=1e-13)
 
 
-@pytest.mark.parametrize("pieces", [[1, 39], [7, 11, 22], [10, 10, 10, 10], [0, 40], [1] * 40])
-def test_calls_in_a_row_are_one_call(where, pieces):
+@pytest.mark.parametrize("chunks", [[1, 39], [7, 11, 22], [10, 10, 10, 10], [0, 40], [1] * 40])
+def test_calls_in_a_row_are_one_call(where, chunks):
     """State goes in and comes out: to the last bit, with commands on their way and periods missed."""
     t, loop = told(40, np.array(3.3), 0.2), HeldLoop(pendulum(), regulator(), where)
     whole, parts, state = run(loop, t, 0.03, last=True), [], None
-    for i, (first, count) in enumerate(zip(np.cumsum([0, *pieces[:-1]]), pieces, strict=True)):
-        piece = Told(*(part[first : first + count] for part in t))
-        parts.append(run(loop, piece, 0.03, state, last=i == len(pieces) - 1))
+    for i, (first, count) in enumerate(zip(np.cumsum([0, *chunks[:-1]]), chunks, strict=True)):
+        chunk = Scheduled(*(part[first : first + count] for part in t))
+        parts.append(run(loop, chunk, 0.03, state, last=i == len(chunks) - 1))
         state = parts[-1].state
     for name in ("x", "quads", "controller", "command", "signals"):
         joined = np.vstack([getattr(part, name) for part in parts])
@@ -204,7 +204,7 @@ def test_the_plant_is_integrated_to_order_four_in_the_longest_step(where, delay)
     assert errors[-1].max() < 1e-8
 
 
-def test_steps_are_equal_and_none_is_longer_than_told(where):
+def test_steps_are_equal_and_none_is_longer_than_scheduled(where):
     loop, t = HeldLoop(pendulum(), regulator(), where), told(6, 0.5)
 
     def end(longest):

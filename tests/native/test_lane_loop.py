@@ -61,9 +61,9 @@ def close(ours, theirs):
         np.testing.assert_allclose(a, b, rtol=0, atol=ROUND * max(1e-3, np.nanmax(np.abs(b), initial=0)))
 
 
-def check(loop, held, robots, count=40, pieces=(), **how):
+def check(loop, held, robots, count=40, chunks=(), **how):
     """Compare all lanes with the loops alone, their whole state after it included."""
-    values, parts = side_by_side(loop, robots, count, pieces, **how)
+    values, parts = side_by_side(loop, robots, count, chunks, **how)
     at, every = loop.instant, how.get("record_every", 1)
     for lane, robot in enumerate(robots):
         theirs = alone(held, robot, count, **how)
@@ -74,7 +74,7 @@ def check(loop, held, robots, count=40, pieces=(), **how):
         f = truth().map(len(rows))
         gains = np.tile(robot.gains[:, None], len(rows))
         close(values[:, at["truth"], lane], f(theirs.x.T, theirs.command.T, rows[:, :2].T, gains).full().T)
-        assert parts[-1].completed[lane] == (pieces or (count,))[-1]
+        assert parts[-1].completed[lane] == (chunks or (count,))[-1]
         after, end = parts[-1].state, theirs.state
         close(after.y[:, lane][None], np.concatenate([end.x, end.quads])[None])
         close(after.controller[:, lane][None], end.controller[None])
@@ -102,13 +102,13 @@ def test_last_sample_and_records_are_as_alone(eight, library, how) -> None:
     check(eight, HeldLoop(pendulum(), regulator(), library), ROBOTS, **how)
 
 
-@pytest.mark.parametrize("pieces", [[1, 39], [7, 11, 22], [20, 20], [0, 40], [1] * 40])
-def test_calls_in_a_row_are_one_call(eight, pieces) -> None:
+@pytest.mark.parametrize("chunks", [[1, 39], [7, 11, 22], [20, 20], [0, 40], [1] * 40])
+def test_calls_in_a_row_are_one_call(eight, chunks) -> None:
     """To the last bit: what is on its way, what was told last, and the time go from one to the next."""
     whole, [once] = side_by_side(eight, ROBOTS, last=True)
-    values, parts = side_by_side(eight, ROBOTS, pieces=pieces, last=True)
+    values, parts = side_by_side(eight, ROBOTS, chunks=chunks, last=True)
     np.testing.assert_array_equal(values, whole)
-    for name in ("y", "controller", "signals", "told"):
+    for name in ("y", "controller", "signals", "scheduled"):
         np.testing.assert_array_equal(getattr(parts[-1].state, name), getattr(once.state, name))
     for lane in range(8):
         np.testing.assert_array_equal(waiting(parts[-1].state, lane), waiting(once.state, lane))
@@ -116,7 +116,7 @@ def test_calls_in_a_row_are_one_call(eight, pieces) -> None:
 
 def test_each_call_begins_with_a_record(eight) -> None:
     whole, _ = side_by_side(eight, ROBOTS)
-    values, _ = side_by_side(eight, ROBOTS, pieces=[7, 1, 32], record_every=4.0)
+    values, _ = side_by_side(eight, ROBOTS, chunks=[7, 1, 32], record_every=4.0)
     np.testing.assert_array_equal(values, whole[[0, 4, 7, *range(8, 40, 4)]])
 
 
@@ -207,9 +207,9 @@ def test_a_lane_that_leaves_the_finite_numbers_says_when(wild, library) -> None:
 
 
 def test_it_is_said_once_and_again_in_each_piece(wild) -> None:
-    """A lane that is gone stays so: it has done no sample of the next piece."""
+    """A lane that is gone stays so: it has done no sample of the next chunk."""
     whole, [once] = side_by_side(wild, RUNAWAYS)
-    values, parts = side_by_side(wild, RUNAWAYS, pieces=[15, 0, 25])
+    values, parts = side_by_side(wild, RUNAWAYS, chunks=[15, 0, 25])
     np.testing.assert_array_equal(values, whole)
     gone = once.completed < 15
     assert gone.any()
@@ -242,7 +242,7 @@ def test_a_lane_that_waits_for_others_stands_still(wild, library) -> None:
 
 
 def test_a_loop_of_almost_nothing(library) -> None:
-    """No memory, signals, surroundings, chance, truth, and nothing told: dx/dt = −x under commands that do nothing."""
+    """No memory, signals, environment, chance, truth, and nothing told: dx/dt = −x under commands that do nothing."""
     x, u, p = cs.SX.sym("x", 1), cs.SX.sym("u", 1), cs.SX.sym("p", 0)
     none = cs.SX(0, 1)
     loop = LaneLoop(
@@ -337,7 +337,7 @@ def test_arguments_of_another_shape_are_refused(eight, name, value, words) -> No
         ("timing", np.full((5, 2, 8), np.nan), r"delay of a command; got .*; needs 0 to 61 periods"),
         ("changes", [Change(0, 8, np.zeros(3))], r"lane of a change; got 8; needs below 8"),
         ("changes", [Change(0, -1, np.zeros(3))], r"lane of a change; got -1; needs below 8"),
-        ("changes", [Change(0, 1, np.zeros(2))], r"told in a change; got \(2,\); needs shape \(3,\)"),
+        ("changes", [Change(0, 1, np.zeros(2))], r"scheduled in a change; got \(2,\); needs shape \(3,\)"),
     ],
 )
 def test_arguments_out_of_range_are_refused(eight, name, value, words) -> None:

@@ -76,8 +76,8 @@ def test_pieces_and_records_change_nothing(loop, every):
     whole = run(loop, t, longest=0.04, p_watch=P).state.watched
     state = loop.start(START, np.zeros(3), FIRST_COMMAND)
     for first in range(0, 42, 14):
-        piece = type(t)(t.rows[first : first + 14], t.timing[first : first + 14])
-        state = run(loop, piece, 0.04, state, record_every=every, first=first, p_watch=P).state
+        chunk = type(t)(t.rows[first : first + 14], t.timing[first : first + 14])
+        state = run(loop, chunk, 0.04, state, record_every=every, first=first, p_watch=P).state
     np.testing.assert_allclose(state.watched, whole, rtol=1e-14, atol=1e-14)
 
 
@@ -91,7 +91,7 @@ def test_nobody_looks_unless_the_watch_is_told_its_numbers(loop):
 @pytest.mark.skipif(find_compiler() is None, reason="no compiler")
 @pytest.mark.parametrize("width", [1, 4, 8])
 def test_each_lane_is_seen_as_it_is_alone(width, library):
-    """Other delays, steps and missed periods beside it; the second piece goes on where the first ended."""
+    """Other delays, steps and missed periods beside it; the second chunk goes on where the first ended."""
     lanes = LaneLoop(functions(cart())._replace(watch=watch()), width)
     held, robots = HeldLoop(cart(), regulator(), library, watch()), ROBOTS[:width]
     state = lanes.start([held.start(r.begin, np.zeros(3), FIRST_COMMAND) for r in robots])

@@ -24,7 +24,7 @@ from worlds import PERIOD, by_rows, merged, planar_text, ran, world
 JUDGED = ("verdict", "time", "term", "margin", "margin_time", "integration_error", "books_error")
 ACTIVE: dict[str, Any] = {
     "law": {"shaped_stiffness": {"ratio": 10}, "shaped_inertia": {"ratio": 0.01}},
-    "control": {"external_torque": "measured", "insist": True, "delay": PERIOD},
+    "control": {"external_torque": "measured", "allow_unstable": True, "delay": PERIOD},
     "motors": {"torque_limit": "robot"},
 }
 """The paper's gains on the small arm: between two samples they give more than there was."""
@@ -161,7 +161,7 @@ def test_lanes_note_what_runs_alone_note() -> None:
         in_lane = simulate_in_lane(problems[seed])
         for name, value in recording.noted.items():
             np.testing.assert_array_equal(in_lane[name], value)
-        stable = "insist" not in str(drawn(seed))
+        stable = "allow_unstable" not in str(drawn(seed))
         if stable:
             assert float(recording["least_margin"]) == pytest.approx(float(alone["least_margin"]), abs=1e-9)
 
@@ -240,7 +240,7 @@ def test_a_step_costs_at_0_s_what_it_costs_later(sampled: bool) -> None:
 
 
 @pytest.mark.parametrize(
-    "changes", [{}, {"control": {"rate": 1000, "external_torque": "true", "insist": True}}]
+    "changes", [{}, {"control": {"rate": 1000, "external_torque": "true", "allow_unstable": True}}]
 )
 def test_the_rigid_law_starts_with_nothing_but_what_it_is_lent(changes: dict[str, Any]) -> None:
     """Before the step it has no energy at all: so the least margin is 0 or less, at 0 s as later."""

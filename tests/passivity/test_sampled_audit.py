@@ -23,7 +23,7 @@ from worlds import PERIOD, books, by_rows, merged, ran
 
 PAPER: dict[str, Any] = {
     "law": {"shaped_stiffness": {"ratio": 10}, "shaped_inertia": {"ratio": 0.01}},
-    "control": {"external_torque": "measured", "insist": True},
+    "control": {"external_torque": "measured", "allow_unstable": True},
 }
 """The paper's gains, at 1 kHz unstable on this arm as on the iiwa."""
 LATE_AND_LIMITED = {"control": {"delay": PERIOD}, "motors": {"torque_limit": "robot"}, "duration": 10.0}

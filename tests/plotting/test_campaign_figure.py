@@ -19,9 +19,9 @@ from passiflex.campaigns.evaluate import evaluate_samples
 from passiflex.campaigns.intervals import Share
 from passiflex.campaigns.page import Band, Bars, Ecdf, Page, Scatter, page
 from passiflex.campaigns.statistics import statistics
-from passiflex.pieces.tables import table_of
+from passiflex.chunks.tables import table_of
 from passiflex.plotting.campaign import A4, DIFFERENT, LESS, MORE, VERDICTS, draw_campaign
-from passiflex.plotting.figures import Curve, save_figure
+from passiflex.plotting.figures import Series, save_figure
 
 VALUES, SHARES = np.array([1.0, 2.0, 4.0]), np.array([0.25, 0.5, 0.75])
 TIME = np.array([0.0, 0.1, 0.2])
@@ -97,7 +97,7 @@ def test_distributions_are_drawn_as_they_are_and_say_what_is_missing() -> None:
 
 
 def test_the_band_lies_between_its_quantiles_with_the_callers_lines() -> None:
-    goal = Curve(TIME, np.array([0.0, 0.1, 0.1]))
+    goal = Series(TIME, np.array([0.0, 0.1, 0.1]))
     axes = axes_of(draw_campaign(made(), {"reference": goal}), "responses")
     median, reference = axes.lines
     np.testing.assert_array_equal(median.get_ydata(), QUANTILES[2])

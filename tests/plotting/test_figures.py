@@ -7,7 +7,7 @@ import pytest
 from matplotlib import pyplot as plt
 from matplotlib.figure import Figure
 
-from passiflex.plotting.figures import CircleColumn, Curve, StepColumn, draw_circle, draw_steps
+from passiflex.plotting.figures import CircleColumn, Series, StepColumn, draw_circle, draw_steps
 from passiflex.plotting.sensitivity import CIRCLE_ROWS, LAWS, STEP_ROWS, Sweep, draw_sensitivity
 from passiflex.plotting.style import LINES
 
@@ -24,7 +24,7 @@ def lines(figure: Figure, place: int) -> dict[str, np.ndarray]:
 
 def test_steps_show_x_y_z_of_every_curve() -> None:
     names = ("proposed", "msd", "baseline", "baseline_motor_aware", "msd_natural")
-    curves = {name: Curve(TIME, signal(i, 3)) for i, name in enumerate(names)}
+    curves = {name: Series(TIME, signal(i, 3)) for i, name in enumerate(names)}
     figure = draw_steps([StepColumn("one", curves), StepColumn("two", curves)], "conditions")
     for row, axis in enumerate("XYZ"):
         for column in range(2):

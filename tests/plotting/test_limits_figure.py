@@ -14,7 +14,7 @@ from matplotlib.lines import Line2D
 
 from passiflex.limits import Admissible, Confirmation, LimitMap
 from passiflex.limits.own_margin import OwnMargin
-from passiflex.limits.planes import Interval, Plane
+from passiflex.limits.planes import Plane, StableRange
 from passiflex.plotting.figures import save_figure
 from passiflex.plotting.limits import draw_limits
 from passiflex.stability.judgement import Judgement
@@ -56,7 +56,7 @@ def found(**changes: Any) -> LimitMap:
         "impedance": Plane(SCALES, DAMPINGS, np.geomspace(0.9, 6, 12).reshape(3, 4)),
         "delays": np.array([0.0, 1.0, 2.0]),
         "least_inertia": LEAST,
-        "damping": Interval(np.array([0.0, 0.2, np.nan]), np.array([5.0, np.inf, np.nan])),
+        "damping": StableRange(np.array([0.0, 0.2, np.nan]), np.array([5.0, np.inf, np.nan])),
         "rates": RATES,
         "least_inertia_by_rate": BY_RATE,
         "radius_by_rate": 1 - BY_RATE / 10,

@@ -14,13 +14,13 @@ from matplotlib.collections import PolyCollection
 from matplotlib.colors import same_color, to_hex
 from matplotlib.figure import Figure
 
+from diagrams.seen import altered, continuous, held_back, made_up, rigid, without
+from passiflex.diagrams import KINDS, Viewed, panels
 from passiflex.errors import NameUnknownError, RunFileError
 from passiflex.plotting.files import save_as
 from passiflex.plotting.run import ROWS_OF_EVENTS, SLIDE_HEIGHT, draw_run, printed
 from passiflex.plotting.style import ROLES, SIZES
 from passiflex.simulation import Run
-from passiflex.views import KINDS, Viewed, panels
-from views.seen import altered, continuous, held_back, made_up, rigid, without
 
 ONE = Viewed(held_back(), "it", np.zeros((held_back().time.size, 3)))
 OTHERS = (Viewed(rigid(), "rigid"), Viewed(continuous(), "continuous"))

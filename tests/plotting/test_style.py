@@ -10,6 +10,8 @@ import matplotlib as mpl
 import pytest
 from matplotlib.colors import same_color
 
+from diagrams.seen import continuous, held_back, made_up, rigid
+from passiflex.diagrams import KINDS, Viewed, panels
 from passiflex.errors import NameUnknownError
 from passiflex.plotting.style import (
     BLUE,
@@ -22,9 +24,7 @@ from passiflex.plotting.style import (
     line,
     size_of,
 )
-from passiflex.views import KINDS, Viewed, panels
 from plotting.vision import contrast, distance, lab
-from views.seen import continuous, held_back, made_up, rigid
 
 DARK = "#14171c"
 APART = 18.0

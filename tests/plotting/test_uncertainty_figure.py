@@ -7,7 +7,7 @@ import numpy as np
 
 from passiflex.campaigns.intervals import share_of
 from passiflex.campaigns.page import Band, Ecdf
-from passiflex.plotting.figures import Curve
+from passiflex.plotting.figures import Series
 from passiflex.plotting.uncertainty import SHOWN, UncertainColumn, draw_uncertainty
 
 TIME = np.linspace(9.0, 20.0, 50)
@@ -22,7 +22,7 @@ def column(title: str, *, falls_back: bool, band: bool = True) -> UncertainColum
         20.0,
         tuple(share_of(name, 30, 40, 0.95) for name in names),
         Band(TIME, np.linspace(-0.01, 0.12, 5)[:, None] * np.ones(50)) if band else None,
-        Curve(TIME, 0.1 * (TIME > 10)),
+        Series(TIME, 0.1 * (TIME > 10)),
         ecdf,
         ecdf._replace(metric="margin", unit="J"),
     )

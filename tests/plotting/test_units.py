@@ -11,20 +11,20 @@ from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from diagrams.seen import held_back, made_up
 from passiflex.campaigns.page import Scatter
+from passiflex.diagrams import KINDS, Viewed
 from passiflex.plotting.campaign import draw_campaign
-from passiflex.plotting.figures import CircleColumn, Curve, StepColumn, draw_circle, draw_steps
+from passiflex.plotting.figures import CircleColumn, Series, StepColumn, draw_circle, draw_steps
 from passiflex.plotting.limits import draw_limits
 from passiflex.plotting.run import draw_run
 from passiflex.plotting.sampled import draw_sampled
 from passiflex.plotting.sensitivity import CIRCLE_ROWS, LAWS, STEP_ROWS, Sweep, draw_sensitivity
 from passiflex.plotting.uncertainty import draw_uncertainty
-from passiflex.views import KINDS, Viewed
 from plotting.test_campaign_figure import EMPTY, made
 from plotting.test_limits_figure import found, rigid
 from plotting.test_sampled_figure import panel
 from plotting.test_uncertainty_figure import column
-from views.seen import held_back, made_up
 
 TIME = np.linspace(0, 1, 5)
 THREE = np.ones((5, 3)) * TIME[:, None]
@@ -36,7 +36,7 @@ def circle() -> Figure:
 
 
 def steps() -> Figure:
-    return draw_steps([StepColumn(name, {"proposed": Curve(TIME, THREE)}) for name in "ab"], "")
+    return draw_steps([StepColumn(name, {"proposed": Series(TIME, THREE)}) for name in "ab"], "")
 
 
 def sensitivity() -> Figure:

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from passiflex.diagrams import KINDS, Viewed, ideal_motion, panels
 from passiflex.errors import PassiflexError
 from passiflex.files import OutputError
 from passiflex.passivity import audit, available_energy
@@ -17,7 +18,6 @@ from passiflex.reports.metrics import sentence, verdict_header
 from passiflex.reports.thinning import CLOSE
 from passiflex.reports.viewer import read_viewer
 from passiflex.simulation import Run
-from passiflex.views import KINDS, Viewed, ideal_motion, panels
 from reports.pages import VIEWER, Page, baseline, changed, continuous, page, sampled, with_nan
 
 ROUND_OFF = {"rtol": 2**-23, "atol": 1e-30}

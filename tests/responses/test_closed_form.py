@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from loops import definite
-from passiflex.loops.motion import Motion, Pose, circle, hold, minimum_jerk
+from passiflex.control.motion import Motion, Pose, circle, hold, minimum_jerk
 from passiflex.problems.problem import Event
 from passiflex.responses import closed_form
 from passiflex.responses.closed_form import ideal_displacement

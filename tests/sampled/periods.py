@@ -20,7 +20,7 @@ from passiflex.robots.flexible import FlexibleJointRobot
 from passiflex.sampled.actions import action_layout, posture_spring, tracking_wrench
 from passiflex.sampled.controller import SampledController
 from passiflex.sampled.sensors import UNFILTERED
-from passiflex.sampled.signals import ControlParameters, LedgerEntry, Wish
+from passiflex.sampled.signals import ControlParameters, LedgerEntry, Setpoint
 from passiflex.sampled.tank import TankEntry
 from passiflex.sampled.tanks import PortTank
 
@@ -66,24 +66,26 @@ class Rig:
         """Return (state, told, p) → (state, τ_m, ledger)."""
         state = cs.SX.sym("state", self.controller.state.size)
         told, t = self.told.symbols("told")
-        y, wish = _said(t)
+        y, setpoint = _said(t)
         p = cs.SX.sym("p", sum(part.size for part in self.controller.parameters))
-        step = self.controller.step(y, wish, t.elapsed, t.given, state, _split(self.controller.parameters, p))
+        step = self.controller.step(
+            y, setpoint, t.elapsed, t.given, state, _split(self.controller.parameters, p)
+        )
         ledger = cs.vertcat(*step.entry.tank, *step.entry[1:])
         outputs = [step.state, step.command.tau_m, ledger]
         return cs.Function("period", [state, told, p], [cs.densify(x) for x in outputs], {"cse": True})
 
     @cached_property
     def alone(self) -> cs.Function:
-        """Return (told, p, added) → τ_m of the law alone with the gains of the wish, S without U, U, f(φ), φ̇."""
+        """Return (told, p, added) → τ_m of the law alone with the gains of the setpoint, S without U, U, f(φ), φ̇."""
         law, (told, t) = self.controller.law, self.told.symbols("told")
         p = cs.SX.sym("p", sum(part.size for part in self.controller.parameters))
-        added, (y, wish) = cs.SX.sym("added", self.n), _said(t)
+        added, (y, setpoint) = cs.SX.sym("added", self.n), _said(t)
         views = _split(self.controller.parameters, p)
         gains = SimpleNamespace(**(vars(views.gains) | {"stiffness": t.stiffness, "damping": t.damping}))
-        command = law.command(y, Reference(wish.pose, wish.velocity), views.model, gains, added)
+        command = law.command(y, Reference(setpoint.pose, setpoint.velocity), views.model, gains, added)
         stored = law.stored(y, views.model, gains)
-        potential = law.task.potential(stored.pose, wish.pose, t.stiffness)
+        potential = law.task.potential(stored.pose, setpoint.pose, t.stiffness)
         outputs = [command.tau_m, stored.energy, potential, *stored.pose, stored.dphi]
         return cs.Function("alone", [told, p, added], [cs.densify(x) for x in outputs], {"cse": True})
 
@@ -93,14 +95,14 @@ class Rig:
         law, (told, t) = self.controller.law, self.told.symbols("told")
         p = cs.SX.sym("p", sum(part.size for part in self.controller.parameters))
         views, rows = _split(self.controller.parameters, p), slice(0, law.task.size)
-        m, g, a, (y, wish) = views.model, views.gains, views.actions, _said(t)
+        m, g, a, (y, setpoint) = views.model, views.gains, views.actions, _said(t)
         stored = law.stored(y, m, g)
         phi, dphi = stored.phi, stored.dphi
         M, J = law.robot.arm.mass_matrix(y.q, m), law.robot.arm.jacobian(y.q, m)[rows, :]
         at_end = law.robot.arm.jacobian(phi, m)
         lead = tracking_wrench(M, J, t.damping, t.velocity[rows], t.acceleration[rows], g.regularisation, a)
         motors = m.motor_inertia if isinstance(law, RigidImpedanceLaw) else g.shaped_inertia
-        error = law.task.error(stored.pose, wish.pose)
+        error = law.task.error(stored.pose, setpoint.pose)
         moving = M + cs.diag(motors)
         pull = posture_spring(moving, at_end[rows, :], error, phi, dphi, g.regularisation, a)
         torque = at_end.T @ t.wrench + at_end[rows, :].T @ lead + pull
@@ -190,10 +192,10 @@ class Rig:
         return self.told.pack(self.told.unpack(told) | changes)
 
 
-def _said(t: SimpleNamespace) -> tuple[Measurement, Wish]:
+def _said(t: SimpleNamespace) -> tuple[Measurement, Setpoint]:
     pose = EndEffectorPose(t.position, t.rotation)
-    wish = Wish(pose, t.velocity, t.acceleration, t.stiffness, t.damping, t.wrench)
-    return Measurement(*(getattr(t, name) for name in Measurement._fields)), wish
+    setpoint = Setpoint(pose, t.velocity, t.acceleration, t.stiffness, t.damping, t.wrench)
+    return Measurement(*(getattr(t, name) for name in Measurement._fields)), setpoint
 
 
 def _split(parts: tuple[Layout, ...], p: cs.SX) -> ControlParameters:

@@ -45,16 +45,16 @@ def two(rig: Rig, seed: int, **fixed: object) -> np.ndarray:
 @settings(max_examples=20, deadline=None)
 @given(seed=SEEDS)
 def test_with_a_full_tank_the_command_is_the_laws_to_the_last_bit(make: Callable[[], Rig], seed: int) -> None:
-    """Whatever is measured and wanted, in the first period and later; the wish is in force at once."""
+    """Whatever is measured and wanted, in the first period and later; the setpoint is in force at once."""
     rig = make()
     p, told = rig.numbers(seed % 100), two(rig, seed, wrench=np.zeros(6))
     out = rig.run(rig.start(rig.random(np.random.default_rng(seed + 1))[0], FULL), told, p)
     for i, row in enumerate(told):
         np.testing.assert_array_equal(out.command[i], rig.law_says(row, p).command)
-        wish = rig.told.unpack(row)
-        np.testing.assert_array_equal(out.governed_position[i], wish["position"])
-        np.testing.assert_array_equal(out.governed_rotation[i], wish["rotation"])
-        np.testing.assert_array_equal(out.held_stiffness[i], wish["stiffness"])
+        setpoint = rig.told.unpack(row)
+        np.testing.assert_array_equal(out.governed_position[i], setpoint["position"])
+        np.testing.assert_array_equal(out.governed_rotation[i], setpoint["rotation"])
+        np.testing.assert_array_equal(out.held_stiffness[i], setpoint["stiffness"])
     for share in (out.entry_reference_share, out.entry_stiffness_share, out.entry_valve):
         np.testing.assert_array_equal(share, 1)
     assert not np.any([out.governed_time, out.latched, out.faults])
@@ -136,7 +136,7 @@ def test_a_poor_tank_holds_the_reference_back_and_never_passes_its_floor(
 
 
 def governed(rig: Rig, row: np.ndarray, out: object, i: int) -> np.ndarray:
-    """Return the row with what was granted as the wish."""
+    """Return the row with what was granted as the setpoint."""
     names = {"position": "governed_position", "rotation": "governed_rotation", "stiffness": "held_stiffness"}
     return rig.but(row, **{name: getattr(out, field)[i] for name, field in names.items()})
 

@@ -171,8 +171,8 @@ def test_the_valve_shuts_in_the_period_that_empties_the_tank(make: Callable[[], 
     rig = make()
     p = rig.numbers(seed % 100, ON)
     told, start = overdrawn(rig, seed, p, by=TRIP - LEVELS["floor"] + 1e-6)
-    wish = {name: rig.told.unpack(told[0])[name] for name in ("position", "rotation", "stiffness")}
-    told[1] = rig.but(told[1], **wish)
+    setpoint = {name: rig.told.unpack(told[0])[name] for name in ("position", "rotation", "stiffness")}
+    told[1] = rig.but(told[1], **setpoint)
     out = rig.run(start, told, p)
     np.testing.assert_array_equal(out.entry_valve, [1, 0])
     np.testing.assert_array_equal(out.command[1], rig.law_says(told[1], p).command)
@@ -219,7 +219,7 @@ def test_a_law_that_has_fallen_back_stays_so(make: Callable[[], Rig]) -> None:
 
 @pytest.mark.parametrize("bad", BAD)
 def test_a_bad_number_repeats_the_command_and_changes_nothing_but_the_count(bad: float) -> None:
-    """Any entry of the measurement or of the wish; the estimator's memory does not change either."""
+    """Any entry of the measurement or of the setpoint; the estimator's memory does not change either."""
     rig = planar_rig(PORT, OBSERVED)
     p, told = rig.numbers(6, ON), rig.random(np.random.default_rng(6), 3)
     begin = rig.run(rig.start(told[0], 5.0), told[:2], p)

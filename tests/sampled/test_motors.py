@@ -23,8 +23,8 @@ SPEEDS = st.floats(-1e3, 1e3)
 def limits() -> cs.Function:
     command, last, limit, rate = (cs.SX.sym(name, N) for name in ("command", "last", "limit", "rate"))
     elapsed = cs.SX.sym("elapsed")
-    given_torque = limited(command, last, limit, rate, elapsed)
-    return cs.Function("limited", [command, last, limit, rate, elapsed], [given_torque])
+    applied_torque = limited(command, last, limit, rate, elapsed)
+    return cs.Function("limited", [command, last, limit, rate, elapsed], [applied_torque])
 
 
 def limit(

@@ -172,12 +172,14 @@ def test_an_unstable_law_is_refused_with_cause_number_and_remedy() -> None:
     )
     assert re.fullmatch(r"  number: 1\.\d+ per period of 1 ms, at 1 kHz with 1 period of delay", number)
     assert "(now 0.05 B)" in remedy
-    assert remedy.endswith("; or control.insist: true, to run it all the same")
+    assert remedy.endswith("; or control.allow_unstable: true, to run it all the same")
 
 
 def test_who_insists_is_let_go_on() -> None:
     require_stable(
-        resolve(world(control={"delay": 1e-3, "insist": True}, law={"shaped_inertia": {"ratio": 0.05}}))
+        resolve(
+            world(control={"delay": 1e-3, "allow_unstable": True}, law={"shaped_inertia": {"ratio": 0.05}})
+        )
     )
 
 
@@ -245,9 +247,9 @@ def test_an_unstable_fallback_is_refused_before_it_is_needed() -> None:
     """The law itself holds; what would stop the arm does not."""
     fallback = {"shaped_stiffness": {"ratio": 1}, "shaped_inertia": {"ratio": 0.01}}
     control = {"rate": 1000, "delay": 0.001, "external_torque": "none", "fallback": fallback}
-    for insist in (False, True):  # who insists on a law relies on what stops the arm all the more
-        problem = resolve(world(control=control | {"insist": insist}))
+    for allow_unstable in (False, True):  # who insists on a law relies on what stops the arm all the more
+        problem = resolve(world(control=control | {"allow_unstable": allow_unstable}))
         with pytest.raises(UnstableLoopError, match="the fallback of 'planar' does not hold") as error:
             require_stable(problem)
         assert "once fallen back, joint" in str(error.value)
-        assert "insist" not in str(error.value)
+        assert "allow_unstable" not in str(error.value)

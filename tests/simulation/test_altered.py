@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 import yaml
 
+from passiflex.control.motion import pose_at
 from passiflex.errors import NameUnknownError, PassiflexError, SizeError, ValueRangeError
-from passiflex.loops.motion import pose_at
 from passiflex.problems.altered import MOST_PERIODS, altered, at_rate
 from passiflex.problems.posture import posture
 from passiflex.sampled.matched_loop import MatchedInnerLoop
@@ -39,7 +39,7 @@ def require_same(one: Problem, other: Problem) -> None:
         np.testing.assert_allclose(getattr(one, name), getattr(other, name), rtol=1e-12, atol=1e-12)
     for name in ("numbers", "plant", "held"):
         np.testing.assert_allclose(getattr(one.sampling, name), getattr(other.sampling, name), rtol=1e-12)
-    for name in ("period", "delay", "jitter", "missed", "insist"):
+    for name in ("period", "delay", "jitter", "missed", "allow_unstable"):
         assert getattr(one.sampling, name) == getattr(other.sampling, name)
     assert one.sampling.controller.inner == other.sampling.controller.inner
     assert (one.noise, one.output_interval, one.duration) == (

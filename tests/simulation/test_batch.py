@@ -165,22 +165,22 @@ def test_order_and_company_change_nothing(fleet: list[Problem], together: list[R
 
 
 @needs_compiler
-@pytest.mark.parametrize("piece", [1, 64, 300, 501])
+@pytest.mark.parametrize("chunk", [1, 64, 300, 501])
 def test_pieces_change_nothing(
-    fleet: list[Problem], together: list[Recording], piece: int, monkeypatch: Any
+    fleet: list[Problem], together: list[Recording], chunk: int, monkeypatch: Any
 ) -> None:
-    """Events, noise that lasts, missed periods and commands on their way go from one piece to the next."""
-    monkeypatch.setattr(batch, "PIECE", piece)
+    """Events, noise that lasts, missed periods and commands on their way go from one chunk to the next."""
+    monkeypatch.setattr(batch, "CHUNK", chunk)
     assert all_same(simulate_batch(fleet, list(together[0].signals)), together)
 
 
 @needs_compiler
-@pytest.mark.parametrize("piece", [2048, 100])
+@pytest.mark.parametrize("chunk", [2048, 100])
 def test_records_are_every_so_many_periods(
-    fleet: list[Problem], together: list[Recording], piece: int, monkeypatch: Any
+    fleet: list[Problem], together: list[Recording], chunk: int, monkeypatch: Any
 ) -> None:
-    """Whole pieces begin with a record; the last sample is one only if its turn comes."""
-    monkeypatch.setattr(batch, "PIECE", piece)
+    """Whole chunks begin with a record; the last sample is one only if its turn comes."""
+    monkeypatch.setattr(batch, "CHUNK", chunk)
     thin = [dataclasses.replace(problem, output_interval=7e-3) for problem in fleet]
     keep = list(together[0].signals)
     for ours, whole, problem in zip(simulate_batch(thin, keep), together, thin, strict=True):
@@ -299,7 +299,7 @@ def test_a_recording_is_dropped_once_it_is_digested(fleet: list[Problem]) -> Non
 
 PAPER: dict[str, Any] = {
     "law": {"shaped_stiffness": {"ratio": 10}, "shaped_inertia": {"ratio": 0.01}},
-    "control": {"external_torque": "measured", "delay": 1e-3, "insist": True},
+    "control": {"external_torque": "measured", "delay": 1e-3, "allow_unstable": True},
     "tank": {"kind": "paper"},
 }
 CALM: dict[str, Any] = merged(
@@ -308,13 +308,13 @@ CALM: dict[str, Any] = merged(
 
 
 @needs_compiler
-@pytest.mark.parametrize("piece", [2048, 50])
+@pytest.mark.parametrize("chunk", [2048, 50])
 @pytest.mark.parametrize("interval", [1e-3, 4e-3])
 def test_a_run_that_leaves_the_finite_numbers_ends_as_alone(
-    piece: int, interval: float, monkeypatch: Any
+    chunk: int, interval: float, monkeypatch: Any
 ) -> None:
     """With the same words and rows, in lanes with others that go on, and with others that end elsewhere."""
-    monkeypatch.setattr(batch, "PIECE", piece)
+    monkeypatch.setattr(batch, "CHUNK", chunk)
     every = {"output_interval": interval}
     wild = [
         resolve(world(**merged(PAPER, every | c))) for c in ({}, {"law": {"damping": {"translation": 4000}}})

@@ -76,16 +76,20 @@ def test_a_complete_file_is_in_si_units() -> None:
     assert s.motors is not None
     assert s.actions is not None
     assert (s.control.rate, s.control.delay) == (2000.0, pytest.approx(0.75e-3))
-    assert (s.control.inner_loop, s.control.external_torque, s.control.insist) == ("plain", "measured", False)
+    assert (s.control.inner_loop, s.control.external_torque, s.control.allow_unstable) == (
+        "plain",
+        "measured",
+        False,
+    )
     assert s.sensors.link_resolution == pytest.approx(math.radians(0.01))
     assert (s.sensors.velocity, s.sensors.torque_bandwidth) == ("true", math.inf)
     assert (s.motors.torque_limit, s.motors.torque_rate_limit) == ("robot", math.inf)
     assert s.actions.follow_velocity == 0.5
-    first, second = s.gains
+    first, second = s.gain_changes
     assert (first.at, first.duration, first.damping) == (0.1, 0.2, None)
     np.testing.assert_allclose(first.stiffness.full(), 300 * np.eye(3))
     assert second.stiffness is None
-    (drag,) = s.drags
+    (drag,) = s.environment
     assert (drag.start, drag.end, drag.viscous, drag.dry) == (0.1, 0.2, 3, 2)
     assert s.feedforward[0].moment == (0, 0, 0)
 
@@ -170,8 +174,8 @@ ONLY = "needs `control`: only a sampled run has it"
         ("0.75 ms", "0, inner_loop: mached", "line 12, column 46, control.inner_loop: unknown word 'mached'; try 'matched'"),
         ("0.75 ms", "0, external_torque: guessed", "line 12, column 51, control.external_torque: unknown word 'guessed'; try 'measured'"),
         ("0.75 ms", "0, observer_bandwidth: 0", "line 12, column 54, control.observer_bandwidth: expected Hz, one number, > 0; got 0 (too small)"),
-        ("0.75 ms", "0, insist: 1", "line 12, column 42, control.insist: expected true or false; got 1"),
-        ("0.75 ms", "0, insist: maybe", "line 12, column 42, control.insist: expected true or false; got 'maybe'"),
+        ("0.75 ms", "0, allow_unstable: 1", "line 12, column 50, control.allow_unstable: expected true or false; got 1"),
+        ("0.75 ms", "0, allow_unstable: maybe", "line 12, column 50, control.allow_unstable: expected true or false; got 'maybe'"),
         ("0.75 ms", "0, fallback: {stiffness: {translation: 5, rotation: 3}}", "line 12, column 83, control.fallback.stiffness.rotation: a position task has no rotation; remove it, or take task: pose"),
         ("0.75 ms", f"0, fallback: {{stiffness: {{matrix: {EYE}}}}}", "line 12, column 65, control.fallback.stiffness.matrix: a position task needs 3×3 numbers in SI units; got 6×6"),
         ("0.75 ms", "0, fallback: {damping: {ratio: 0.7}}", "line 12, column 54, control.fallback.damping: a damping ratio belongs to one posture; give D_x itself"),
@@ -276,7 +280,6 @@ def test_without_a_rate_nothing_sampled_is_allowed() -> None:
         f"line 15, column 10, actions: {ONLY}",
         f"line 17, column 3, gains: {ONLY}",
         f"line 19, column 14, feedforward: {ONLY}",
-        f"line 20, column 8, drags: {ONLY}",
     ]
     continuous = changed("control: {rate: 1000}\n", "", RIGID.replace("rigid", "impedance"))
     shaped = "shaped_stiffness: {ratio: 1}\n  shaped_inertia: {ratio: 1}\n"

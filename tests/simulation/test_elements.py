@@ -91,9 +91,9 @@ def test_what_passes_the_ports_is_what_the_robot_stores_and_loses(chain: SerialC
     """Ḣ = external + motor − lost, with H from the signals of the plant, differentiated along its own vector field."""
     rng, plant = np.random.default_rng(seed), Plant(with_joints(chain, seed))
     n = chain.n
-    state, u = cs.SX.sym("x", 4 * n), cs.SX.sym("u", n + plant.surroundings.size)
+    state, u = cs.SX.sym("x", 4 * n), cs.SX.sym("u", n + plant.environment.size)
     p, m = plant.parameters.symbols("p")
-    x, s = plant.view(state), plant.surroundings.view(u[n:])
+    x, s = plant.view(state), plant.environment.view(u[n:])
     true = plant.true(x, s, m)
     parts = ("link_kinetic", "motor_kinetic", "joint_spring", "potential")
     energy = sum(true[f"{part}_energy"] for part in parts)
@@ -120,8 +120,8 @@ def test_a_plant_has_the_numbers_of_what_touches_it() -> None:
     bare, touched = Plant(robot, ()), Plant(robot)
     assert bare.parameters == robot.layout
     assert [f.name for f in bare.energies] == ["external", "motor", "joint", "joint_loss"]
-    assert [f.name for f in bare.surroundings] == ["F_e"]
+    assert [f.name for f in bare.environment] == ["F_e"]
     extra = {f.name for f in touched.parameters} - {f.name for f in bare.parameters}
     assert extra == {"coulomb_friction", "viscous_friction", "friction_width"}
-    assert {f.name for f in touched.surroundings} == {"F_e", *(f.name for f in Drag().inputs())}
+    assert {f.name for f in touched.environment} == {"F_e", *(f.name for f in Drag().inputs())}
     assert [f.name for f in touched.energies][-1] == "friction"

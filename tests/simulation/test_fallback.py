@@ -25,7 +25,7 @@ PAPER = {"law": {"shaped_stiffness": {"ratio": 10}, "shaped_inertia": {"ratio": 
 INSISTENT: dict[str, Any] = merged(
     PAPER,
     {
-        "control": {"external_torque": "measured", "delay": 1e-3, "insist": True},
+        "control": {"external_torque": "measured", "delay": 1e-3, "allow_unstable": True},
         "motors": {"torque_limit": "robot"},
         "tank": {"initial": 0.4},
         "reference": [
@@ -165,7 +165,7 @@ def test_the_papers_gains_on_the_iiwa_are_caught_within_its_limits() -> None:
 @pytest.mark.parametrize("delay", [0.0, 1e-3])
 def test_an_unstable_loop_is_refused_with_gains_that_hold(delay: float) -> None:
     """Nothing is run; with what is said to write, the same scenario runs and never falls back."""
-    changes = merged(INSISTENT, {"control": {"insist": None, "delay": delay}, "motors": None})
+    changes = merged(INSISTENT, {"control": {"allow_unstable": None, "delay": delay}, "motors": None})
     problem = resolve(world(**changes))
     with pytest.raises(UnstableLoopError, match="the law of 'planar' does not hold"):
         simulate_problem(problem)
@@ -194,4 +194,4 @@ def test_jitter_counts_as_delay() -> None:
 
 
 def test_insisting_changes_nothing_of_a_loop_that_is_stable() -> None:
-    np.testing.assert_array_equal(ran(control={"insist": True})["q"], ran()["q"])
+    np.testing.assert_array_equal(ran(control={"allow_unstable": True})["q"], ran()["q"])

@@ -11,9 +11,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from passiflex.control.motion import circle
 from passiflex.errors import SimulationError
 from passiflex.loops.closed_loop import ENERGIES
-from passiflex.loops.motion import circle
 from passiflex.native import fastest_pole
 from passiflex.simulation import CompiledLoop, Problem, Run, Scenario, compiled_loop, resolve, simulate
 from passiflex.simulation.integrate import SLOW_POLE, held_stretch, resolved_stretch, smooth_stretch

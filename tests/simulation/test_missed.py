@@ -97,7 +97,7 @@ def test_the_border_is_where_simulations_begin_to_grow() -> None:
     }
     speeds = []
     for share in (below, above):
-        control = LIGHT["control"] | {"missed": float(share), "insist": True}
+        control = LIGHT["control"] | {"missed": float(share), "allow_unstable": True}
         runs = [simulate(world(**changes | {"control": control, "tank": None, "seed": k})) for k in range(4)]
         speeds.append([np.abs(run["dq"][-1000:]).max() if not run.failure else np.inf for run in runs])
     assert max(speeds[0]) < 1e-3

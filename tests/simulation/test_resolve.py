@@ -11,10 +11,10 @@ import yaml
 from scipy.spatial.transform import Rotation
 
 from passiflex.control.law import ImpedanceLaw
+from passiflex.control.motion import pose_at
 from passiflex.control.rigid import RigidImpedanceLaw
 from passiflex.control.tank import NO_CAP, EnergyTank
 from passiflex.errors import NameUnknownError, PassiflexError, ScenarioError, SizeError, ValueRangeError
-from passiflex.loops.motion import pose_at
 from passiflex.problems.gains import target_inertia
 from passiflex.problems.posture import natural_inertia, posture
 from passiflex.robots import FlexibleJointRobot

@@ -1,4 +1,4 @@
-"""What a sampled loop is told in each period: chance in streams of its own, events in whatever piece they fall into."""
+"""What a sampled loop is told in each period: chance in streams of its own, events in whatever chunk they fall into."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from passiflex.loops.recorded import sample_parts
 from passiflex.loops.sampled_loop import SampledLoop
 from passiflex.robots.arm import SerialArm
 from passiflex.simulation import ClosedLoop, resolve
-from passiflex.simulation.rows import Rows
+from passiflex.simulation.schedule import PeriodRows
 from worlds import PERIOD, world
 
 NOISE = {"noise": {"torque_variance": 0.25, "hold": PERIOD}}
@@ -28,14 +28,14 @@ ACTING: dict[str, Any] = {
 }
 
 
-def told(*pieces: int, **changes: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the periods' noise, timing with the time since the last one that ran, and rows; made in such pieces."""
+def told(*chunks: int, **changes: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the periods' noise, timing with the time since the last one that ran, and rows; made in such chunks."""
     problem = resolve(world(**NOISE | changes))
     assert problem.sampling is not None
     compiled = compiled_sampled_loop(problem.sampling.loop)
-    rows, first = Rows(problem, compiled.loop.period, compiled.row), 0
+    rows, first = PeriodRows(problem, compiled.loop.period, compiled.row), 0
     said, timing, at = [], [], compiled.loop.row.slices
-    for count in pieces:
+    for count in chunks:
         row, when = rows.take(first, count)
         said.append(row)
         timing.append(np.column_stack([when, row[:, at["elapsed"]]]))
@@ -58,7 +58,7 @@ def test_noise_jitter_and_missed_periods_do_not_touch_each_other() -> None:
 
 
 def test_rows_do_not_depend_on_the_pieces_that_they_are_made_in() -> None:
-    """Events, gains that change one after the other, drags and chance, whatever piece they fall into."""
+    """Events, gains that change one after the other, drags and chance, whatever chunk they fall into."""
     gains = [
         {"at": 0.1 + 0.05 * i, "duration": 0.05, "stiffness": {"translation": 200 + 100 * (i % 3)}}
         for i in range(5)
@@ -67,8 +67,8 @@ def test_rows_do_not_depend_on_the_pieces_that_they_are_made_in() -> None:
     chance = {"jitter": 1e-3, "missed": 0.3}
     changes = {"gains": gains, "control": chance} | ACTING
     whole = told(500, **changes)
-    for pieces in ((1, 150, 349), (100, 25, 25, 25, 325), (499, 1)):
-        for one, other in zip(told(*pieces, **changes), whole, strict=True):
+    for chunks in ((1, 150, 349), (100, 25, 25, 25, 325), (499, 1)):
+        for one, other in zip(told(*chunks, **changes), whole, strict=True):
             np.testing.assert_array_equal(one, other)
 
 
@@ -80,12 +80,12 @@ def test_a_sample_of_the_noise_lasts_as_long_as_it_is_held(lasting: int) -> None
     np.testing.assert_array_equal(held, np.repeat(fresh, lasting, axis=0)[:400])
 
 
-@pytest.mark.parametrize("pieces", [(1,) * 12, (5, 7), (3, 3, 6), (2, 1, 8, 1), (4, 4, 4)])
+@pytest.mark.parametrize("chunks", [(1,) * 12, (5, 7), (3, 3, 6), (2, 1, 8, 1), (4, 4, 4)])
 @pytest.mark.parametrize("lasting", [3, 4, 30])
-def test_noise_that_is_held_does_not_depend_on_the_pieces(pieces: tuple[int, ...], lasting: int) -> None:
-    """Pieces that end with a sample, in the middle of one, and that lie within one."""
+def test_noise_that_is_held_does_not_depend_on_the_chunks(chunks: tuple[int, ...], lasting: int) -> None:
+    """Chunks that end with a sample, in the middle of one, and that lie within one."""
     changes: dict[str, Any] = {"control": {"jitter": 1e-3, "missed": 0.3}} | _held(lasting)
-    for one, other in zip(told(*pieces, **changes), told(12, **changes), strict=True):
+    for one, other in zip(told(*chunks, **changes), told(12, **changes), strict=True):
         np.testing.assert_array_equal(one, other)
 
 

@@ -15,7 +15,8 @@ from passiflex.errors import ScenarioError
 from passiflex.scenarios.law_settings import ImpedanceSettings, RigidSettings
 from passiflex.scenarios.model_errors import Deviations, ModelErrors
 from passiflex.scenarios.noise_settings import Noise
-from passiflex.scenarios.scenario import Circle, Hold, Move, Scenario, Step, TankSettings
+from passiflex.scenarios.reference import Circle, Hold, Move, Step
+from passiflex.scenarios.scenario import Scenario, TankSettings
 from passiflex.scenarios.scenario_file import load_scenario, parse_scenario
 from passiflex.texts.text_file import MAX_BYTES
 

@@ -14,6 +14,7 @@ import h5py
 import numpy as np
 import pytest
 
+from passiflex.diagrams import ideal_motion, marks_of
 from passiflex.errors import RunFileError, SizeError, ValueRangeError
 from passiflex.reports import report_text
 from passiflex.reports.facts import shown_configuration
@@ -24,7 +25,6 @@ from passiflex.runs.run_arm import chain_of, problem_of, robot_of
 from passiflex.runs.run_attributes import KINDS
 from passiflex.runs.salvaged import salvage
 from passiflex.simulation import Run, parse_scenario, resolve, simulate
-from passiflex.views import ideal_motion, marks_of
 from worlds import PLANAR
 
 

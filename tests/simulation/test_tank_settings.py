@@ -19,7 +19,7 @@ from passiflex.errors import ScenarioError
 from passiflex.robots.arm import EndEffectorPose
 from passiflex.robots.flexible import FlexibleJointRobot
 from passiflex.sampled.controller import SampledController
-from passiflex.sampled.signals import ControlParameters, Wish
+from passiflex.sampled.signals import ControlParameters, Setpoint
 from passiflex.sampled.tanks import TANKS
 from passiflex.scenarios.tank_uses import CONTINUOUS, SAMPLED
 from passiflex.simulation import parse_scenario
@@ -66,7 +66,7 @@ def named_in_the_code(kind: str) -> set[str]:
     pose = EndEffectorPose(cs.SX.sym("p", 3), cs.SX.sym("R", 3, 3))
     sizes = {"q": n, "theta": n, "dq": n, "dtheta": n, "tau_a": n, "tau_e": n, "F_e": 6}
     y = Measurement(**{k: cs.SX.sym(k, size) for k, size in sizes.items()})
-    wish = Wish(
+    setpoint = Setpoint(
         pose,
         cs.SX.sym("v", 6),
         cs.SX.sym("a", 6),
@@ -75,7 +75,7 @@ def named_in_the_code(kind: str) -> set[str]:
         cs.SX.sym("w", 6),
     )
     state = cs.SX.sym("s", controller.state.size)
-    step = controller.step(y, wish, cs.SX.sym("dt"), cs.SX.sym("u", n), state, ControlParameters(*views))
+    step = controller.step(y, setpoint, cs.SX.sym("dt"), cs.SX.sym("u", n), state, ControlParameters(*views))
     everything = cs.vertcat(step.command.tau_m, step.state, step.entry.valve)
     used = cs.which_depends(everything, tank, 1, False)
     names = [f.name.removeprefix("tank_") for f in controller.tank.layout for _ in range(f.size)]

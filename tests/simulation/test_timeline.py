@@ -8,7 +8,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from passiflex.loops.motion import Pose
+from passiflex.control.motion import Pose
 from passiflex.problems.timeline import timeline
 from passiflex.scenarios.scenario import Force
 from passiflex.simulation import Scenario, parse_scenario

@@ -159,8 +159,10 @@ def test_the_papers_variants_would_be_refused_without_insisting(key: str) -> Non
     printed = shipped_scenario("fig1").law
     assert scenario.law == printed
     assert scenario.control is not None
-    assert scenario.control.insist
-    timid = scenario.model_copy(update={"control": scenario.control.model_copy(update={"insist": False})})
+    assert scenario.control.allow_unstable
+    timid = scenario.model_copy(
+        update={"control": scenario.control.model_copy(update={"allow_unstable": False})}
+    )
     with pytest.raises(UnstableLoopError, match="the law of 'fig1_sampled' does not hold"):
         simulate(timid)
 
@@ -169,7 +171,7 @@ def test_the_shipped_scenarios_are_stable_without_insisting() -> None:
     for task in sampled.TASKS:
         scenario = shipped_scenario(f"{task}_sampled")
         assert scenario.control is not None
-        assert not scenario.control.insist
+        assert not scenario.control.allow_unstable
         assert not simulate(
             scenario.model_copy(update={"duration": 0.1, "reference": (), "forces": ()})
         ).failure

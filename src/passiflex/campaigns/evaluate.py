@@ -18,6 +18,9 @@ from passiflex.campaigns.draws import columns, draws, words
 from passiflex.campaigns.measures import MEASURES, SIGNALS, measures
 from passiflex.campaigns.same_robot import require_same_robot
 from passiflex.campaigns.samples import sample_scenario
+from passiflex.chunks.engines import usable_cores
+from passiflex.chunks.manifest import load_manifest
+from passiflex.chunks.source import source_digest
 from passiflex.errors import (
     PassiflexError,
     PassiflexWarning,
@@ -26,9 +29,6 @@ from passiflex.errors import (
 )
 from passiflex.files import as_path
 from passiflex.passivity.ledger import Signals
-from passiflex.pieces.engines import usable_cores
-from passiflex.pieces.manifest import load_manifest
-from passiflex.pieces.source import source_digest
 from passiflex.problems.problem import Problem
 from passiflex.responses.steps import displacement, step_window
 from passiflex.simulation import Run, Scenario, resolve, simulate_problem

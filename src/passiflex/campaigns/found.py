@@ -30,7 +30,7 @@ class Case(NamedTuple):
     ----------
     values: What each parameter is.
     measures: Verdict, failure and numbers of the run, as `measures.measures` gives them.
-    scenario: Complete; `control.insist` is true where its loop is unstable.
+    scenario: Complete; `control.allow_unstable` is true where its loop is unstable.
     """
 
     values: Values
@@ -145,7 +145,7 @@ def case_scenario(scenario: Scenario, problem: Problem, rank: int) -> Scenario:
         try:
             require_stable(problem)
         except UnstableLoopError:
-            changes["control"] = scenario.control.model_copy(update={"insist": True})
+            changes["control"] = scenario.control.model_copy(update={"allow_unstable": True})
     return scenario.model_copy(update=changes)
 
 

@@ -15,7 +15,7 @@ def require_possible(campaign: Campaign) -> None:
     """Raise unless the robot can be in the scenario with every parameter at either end, others at their medians.
 
     A posture beyond the joint limits, a singular one, a list of the wrong length: what `resolve` finds. An unstable
-    loop is not among it: `simulate` refuses that, unless `control.insist` is true.
+    loop is not among it: `simulate` refuses that, unless `control.allow_unstable` is true.
 
     Raises
     ------

@@ -24,15 +24,15 @@ from passiflex.campaigns.possible import require_possible
 from passiflex.campaigns.ranking import worst_first
 from passiflex.campaigns.same_robot import marked, robot_digest
 from passiflex.campaigns.samples import sample_scenario
+from passiflex.chunks.cluster import Cluster
+from passiflex.chunks.engines import Engine, InProcess, LocalProcesses
+from passiflex.chunks.manifest import FolderError, load_manifest
+from passiflex.chunks.run_chunks import Progress, run_chunks
+from passiflex.chunks.store import Store, open_store
+from passiflex.chunks.stored_rows import read_blocks, read_rows
 from passiflex.errors import ArgumentError, NameUnknownError, PassiflexError, ValueRangeError
 from passiflex.files import as_path
 from passiflex.native import find_compiler
-from passiflex.pieces.cluster import Cluster
-from passiflex.pieces.engines import Engine, InProcess, LocalProcesses
-from passiflex.pieces.manifest import FolderError, load_manifest
-from passiflex.pieces.run_pieces import Progress, run_pieces
-from passiflex.pieces.store import Store, open_store
-from passiflex.pieces.stored_rows import read_blocks, read_rows
 from passiflex.simulation import Problem, Run, resolve
 from passiflex.simulation.batch import lane_loop
 from passiflex.stability.admissible import require_stable
@@ -134,7 +134,7 @@ def run_campaign(
         with open_store(
             folder, text, campaign.samples, extends=prefix, identity=identity, beside=beside
         ) as store:
-            run_pieces(store, evaluate_samples, engine, on_progress)
+            run_chunks(store, evaluate_samples, engine, on_progress)
             results = Results(folder, campaign)
             return Results(results.folder, campaign, _keep_worst(results, store))
 

@@ -11,7 +11,7 @@ from typing import Any, Literal
 from pydantic.fields import FieldInfo
 
 from passiflex.scenarios.scenario import Scenario
-from passiflex.texts.model_mistakes import Model, fields, models, suggested, tag_field
+from passiflex.texts.model_mistakes import Model, fields, former_names, models, suggested, tag_field
 from passiflex.texts.quantity import Quantity
 
 _INDEX = re.compile(r"[1-9][0-9]{0,5}")
@@ -91,6 +91,7 @@ def locate(data: dict[str, Any], path: str) -> Target:
             value = value[_index(part, value, before)]
             continue
         known = {k: f for m in _decided(here, value) for k, f in fields(m).items()}
+        part = {k: n for m in _decided(here, value) for k, n in former_names(m).items()}.get(part, part)
         if part not in known:
             message = suggested(part, known)
             raise PathRefusedError(

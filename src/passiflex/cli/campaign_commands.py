@@ -112,7 +112,7 @@ def _sum_up(results: Results) -> None:
     from passiflex.cli.campaign_tables import statistics_tables
     from passiflex.files import whole_file
     from passiflex.plotting.campaign import draw_campaign
-    from passiflex.plotting.figures import Curve, save_figure
+    from passiflex.plotting.figures import Series, save_figure
 
     folder = results.folder
     rows = results.narrow_rows()
@@ -121,7 +121,7 @@ def _sum_up(results: Results) -> None:
         temporary.write_text(json.dumps(found.to_dict(), indent=2, allow_nan=False) + "\n", encoding="utf-8")
     ideal = ideal_along(results.campaign)
     drawing = draw_campaign(
-        page(results.campaign, rows, found, results.responses()), {"msd": Curve(*ideal)} if ideal else {}
+        page(results.campaign, rows, found, results.responses()), {"msd": Series(*ideal)} if ideal else {}
     )
     written = [folder / "samples.parquet", folder / STATISTICS]
     written += [*save_figure(drawing, (folder / PAGE[0]).with_suffix("")), *results.runs]

@@ -14,7 +14,7 @@ from passiflex.cli.streams import drop_output, leave_closed_pipe, printable
 from passiflex.files import OutputError
 
 if TYPE_CHECKING:
-    from passiflex.pieces.run_pieces import Progress
+    from passiflex.chunks.run_chunks import Progress
 
 
 class PlainConsole(Console):
@@ -69,7 +69,7 @@ def progress_lines() -> Iterator[Callable[[str], None]]:
 def campaign_bar() -> Iterator[Callable[[Progress], None]]:
     """Give a function that shows how far a campaign is: a bar on a terminal, a line now and then otherwise."""
     if not console.is_terminal:
-        from passiflex.pieces.run_pieces import sparsely
+        from passiflex.chunks.run_chunks import sparsely
 
         yield sparsely(lambda p: console.print(f"{p.done} of {p.total} samples, {_words(p)}"))
         return

@@ -69,9 +69,9 @@ def plot(
     ] = None,
 ) -> int:
     """Draw the energies, the tracking, the torques or the powers at the ports of a run."""
+    from passiflex.diagrams import viewed
     from passiflex.plotting.figures import save_as
     from passiflex.plotting.run import draw_run
-    from passiflex.views import viewed
 
     with timed():
         target = _target(out, f"_{kind}.png", DRAWN, run, *compare)

@@ -21,7 +21,7 @@ def write_mcap(run: Run, path: Path) -> None:
 
     `/tf` has the frames `base`, `link_1`, ..., `tip`, `/robot_description` the arm with clean solids, as in a
     URDF; `/joint_states` q, q̇, τ_a and `/motor_states` θ, θ̇, τ_m by joint; `/end_effector`, `/reference` and
-    `/governed_reference` poses in `base`; `/wrench` what the surroundings exert, at the end effector in the
+    `/governed_reference` poses in `base`; `/wrench` what the environment exert, at the end effector in the
     axes of the base. A scalar signal is a topic of its own: `/energy/tank`, `/power/external`, `/signal/valve`;
     any other one `/signal/NAME`, with its entries row by row. The units are in the metadata record `units`, by
     topic and field. A run that does not say which arm it was has no `/tf` and no `/robot_description`; a pose that is

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from passiflex.diagrams.viewed import first_finite
 from passiflex.exports.quaternions import quaternions
 from passiflex.exports.rerun_stream import BLUE, GREY, ORANGE, PINK, RED, Colour, Stream
 from passiflex.robots.bodies import Array
@@ -15,7 +16,6 @@ from passiflex.robots.frames import relative_frames
 from passiflex.robots.solids import COLOURS, Solid, solids, with_solids
 from passiflex.runs.run import Run
 from passiflex.runs.run_arm import chain_of
-from passiflex.views.viewed import first_finite
 
 LONGEST_ARROW = 0.25
 """Length of the arrow of the largest force [m]."""

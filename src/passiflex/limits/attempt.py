@@ -45,7 +45,7 @@ class Attempt:
         self.robot, self.variance, self.inner, self.report = robot, variance, inner, report
         report(f"{inner} inner loop: compiling, {len(places)} postures")
         shaping = {"shaped_stiffness": {"ratio": 1}, "shaped_inertia": {"ratio": 1}}
-        control = {"inner_loop": inner, "external_torque": "none", "insist": False}
+        control = {"inner_loop": inner, "external_torque": "none", "allow_unstable": False}
         text = rewritten(scenario, {"law": shaping, "control": control})
         self.problems = tuple(
             resolve(parse_scenario(rewritten(text, {"posture": q.tolist()}), "recommend"), robot)

@@ -10,9 +10,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from passiflex.control.motion import hold
 from passiflex.control.tank import NO_CAP
 from passiflex.errors import ValueRangeError
-from passiflex.loops.motion import hold
 from passiflex.problems.altered import altered, replaced
 from passiflex.problems.problem import Event, Noise
 from passiflex.simulation import Problem
@@ -101,7 +101,7 @@ def disturbed(problem: Problem, periods: int = PERIODS) -> Problem:
         s,
         jitter=0.0,
         missed=0.0,
-        insist=True,
+        allow_unstable=True,
         numbers=numbers,
         plant=numbers[: parts.plant.size],
         gains=(),

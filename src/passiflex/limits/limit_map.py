@@ -14,8 +14,8 @@ from passiflex.limits.confirmation import Confirmation, confirm
 from passiflex.limits.one_thread import on_one_thread
 from passiflex.limits.own_margin import OwnMargin, own_margin
 from passiflex.limits.planes import (
-    Interval,
     Plane,
+    StableRange,
     impedance_plane,
     least_inertias,
     least_inertias_by_rate,
@@ -95,7 +95,7 @@ class LimitMap:
     impedance: Plane
     delays: Array
     least_inertia: Array | None
-    damping: Interval
+    damping: StableRange
     rates: Array
     least_inertia_by_rate: Array | None
     radius_by_rate: Array

@@ -26,7 +26,7 @@ class Plane(NamedTuple):
     radius: Array
 
 
-class Interval(NamedTuple):
+class StableRange(NamedTuple):
     """What is stable of a gain at each value of another: from `least` to `most`, (a,).
 
     nan where nothing is; 0 and inf where the end lies beyond the plane.
@@ -58,7 +58,7 @@ def scaled_impedance(loop: LinearLoop, stiffness_scale: float, damping_scale: fl
     return {"stiffness": stiffness_scale * own["stiffness"], "damping": damping_scale * own["damping"]}
 
 
-def stable_damping(loop: LinearLoop, plane: Plane) -> Interval:
+def stable_damping(loop: LinearLoop, plane: Plane) -> StableRange:
     """Return the stable D_x of an impedance plane at each K_x: the longest stretch of the grid, its ends refined."""
     ends = []
     for k, radii in zip(plane.horizontal, plane.radius, strict=True):
@@ -68,7 +68,7 @@ def stable_damping(loop: LinearLoop, plane: Plane) -> Interval:
 
         ends.append(_stretch(plane.vertical, radii < 1, stable))
     least, most = np.array(ends).T
-    return Interval(least, most)
+    return StableRange(least, most)
 
 
 def least_inertias(loop: LinearLoop, stiffness_ratios: Array) -> Array:

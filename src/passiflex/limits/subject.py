@@ -64,7 +64,7 @@ def with_task(scenario: Scenario, task: str) -> Scenario:
         places: list[tuple[str, Any]] = [("law", scenario.law)]
         if scenario.control is not None:
             places.append(("control.fallback", scenario.control.fallback))
-        places += [(f"gains[{i}]", change) for i, change in enumerate(scenario.gains)]
+        places += [(f"gain_changes[{i}]", change) for i, change in enumerate(scenario.gain_changes)]
         for place, section in places:
             for name in GAINS:
                 gains = getattr(section, name, None)

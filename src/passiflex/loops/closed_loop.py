@@ -10,10 +10,10 @@ from typing import NamedTuple
 import casadi as cs
 
 from passiflex.control.law import AbstractLaw
+from passiflex.control.motion import MOTION, reference_at
 from passiflex.control.signals import Command, Measurement
 from passiflex.control.tank import EnergyTank
 from passiflex.layout import Field, Layout
-from passiflex.loops.motion import MOTION, reference_at
 from passiflex.loops.plant import PORTS, Plant
 from passiflex.loops.witness import Instant, Witness
 from passiflex.robots.flexible import RobotState

@@ -61,7 +61,7 @@ class AbstractElement(abc.ABC):
 
     Attributes
     ----------
-    booked: Under which name a run has what it lost; empty if that is part of what the surroundings gave.
+    booked: Under which name a run has what it lost; empty if that is part of what the environment gave.
     meaning: What that is, in words.
     acts: False leaves its arithmetic out, where all its numbers are 0; they stay where they are.
     """

@@ -1,4 +1,4 @@
-"""What a sampled loop is told in one period: a pure function of the time, of what was ordered, and of chance."""
+"""What a sampled loop is schedule in one period: a pure function of the time, of what was ordered, and of chance."""
 
 from __future__ import annotations
 
@@ -7,26 +7,26 @@ from functools import cached_property
 
 import casadi as cs
 
+from passiflex.control.motion import MOTION, reference_at
 from passiflex.layout import Field, Layout
-from passiflex.loops.motion import MOTION, reference_at
 
 
 @dataclass(frozen=True)
 class PeriodRow:
-    """The row of a loop with n joints, k directions of its task, and these surroundings.
+    """The row of a loop with n joints, k directions of its task, and these environment.
 
-    `told` holds what stays from one event to the next, `drawn` what is new in every period.
+    `schedule` holds what stays from one event to the next, `drawn` what is new in every period.
     """
 
     n: int
     k: int
-    surroundings: Layout
+    environment: Layout
 
     @cached_property
     def layout(self) -> Layout:
-        """Return the row; the surroundings come first."""
+        """Return the row; the environment come first."""
         n, k = self.n, self.k
-        return self.surroundings + Layout(
+        return self.environment + Layout(
             (
                 Field("desired_position", (3,), "m", "x_d", axes=("axis",)),
                 Field("desired_rotation", (3, 3), "1", "axes of x_d", axes=("axis", "column")),
@@ -41,8 +41,8 @@ class PeriodRow:
         )
 
     @cached_property
-    def told(self) -> Layout:
-        """Return what is told at an event, and holds until the next."""
+    def schedule(self) -> Layout:
+        """Return what is schedule at an event, and holds until the next."""
         k = self.k
         own = (
             Field("began", (), "s", "when the motion of the reference began"),
@@ -54,7 +54,7 @@ class PeriodRow:
             Field("change_to", (), "s", "when it has ended"),
             Field("feedforward", (6,), "N, N m", "wrench that the end effector is to exert"),
         )
-        return self.surroundings + MOTION + Layout(own)
+        return self.environment + MOTION + Layout(own)
 
     @cached_property
     def drawn(self) -> Layout:
@@ -63,20 +63,20 @@ class PeriodRow:
 
     @cached_property
     def function(self) -> cs.Function:
-        """Return (time, told, drawn) → row. Gains go over to others with minimum jerk."""
+        """Return (time, schedule, drawn) → row. Gains go over to others with minimum jerk."""
         time = cs.SX.sym("time")
-        told, c = self.told.symbols("told")
+        schedule, c = self.schedule.symbols("schedule")
         drawn, chance = self.drawn.symbols("drawn")
         clock = cs.SX.sym("clock")
         motion = reference_at(clock, cs.SX(1), c)
         acceleration = cs.jacobian(motion.velocity, clock)
         known = cs.Function(
-            "known", [clock, told], [*motion.pose, motion.velocity, acceleration], {"cse": True}
+            "known", [clock, schedule], [*motion.pose, motion.velocity, acceleration], {"cse": True}
         )
-        position, rotation, velocity, acceleration = known(cs.fmax(time - c.began, 0), told)
+        position, rotation, velocity, acceleration = known(cs.fmax(time - c.began, 0), schedule)
         s = cs.fmin(cs.fmax((time - c.change_from) / (c.change_to - c.change_from), 0), 1)
         blend = s**3 * (10 - 15 * s + 6 * s**2)
-        values = {f.name: getattr(c, f.name) for f in self.surroundings} | {
+        values = {f.name: getattr(c, f.name) for f in self.environment} | {
             "desired_position": position,
             "desired_rotation": rotation,
             "desired_velocity": velocity,
@@ -88,7 +88,7 @@ class PeriodRow:
             "elapsed": chance.elapsed,
         }
         row = self.layout.stack(values)
-        return cs.Function("row", [time, told, drawn], [cs.densify(row)], {"cse": True})
+        return cs.Function("row", [time, schedule, drawn], [cs.densify(row)], {"cse": True})
 
 
 def _between(old: cs.SX, new: cs.SX, blend: cs.SX) -> cs.SX:

@@ -15,7 +15,7 @@ from passiflex.robots.arm import TipWrench
 from passiflex.robots.flexible import FlexibleJointRobot, RobotState
 
 PORTS = (
-    Field("external", (), "J", "∫ τ_eᵀ q̇: given to the robot by its surroundings"),
+    Field("external", (), "J", "∫ τ_eᵀ q̇: given to the robot by its environment"),
     Field("motor", (), "J", "∫ τ_mᵀ θ̇: given to the motors by the law"),
     Field("joint", (), "J", "∫ τ_aᵀ q̇: given to the links through the joints"),
     Field("joint_loss", (), "J", "∫ (θ̇ − q̇)ᵀ D (θ̇ − q̇): lost in the real joints"),
@@ -41,7 +41,7 @@ class Flow(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Plant:
-    """ẋ = f(x, [τ_m, surroundings], p) for x = (q, θ, q̇, θ̇), with what passes its ports.
+    """ẋ = f(x, [τ_m, environment], p) for x = (q, θ, q̇, θ̇), with what passes its ports.
 
     Attributes
     ----------
@@ -57,7 +57,7 @@ class Plant:
         return sum((e.parameters(self.robot.n) for e in self.elements), self.robot.layout)
 
     @cached_property
-    def surroundings(self) -> Layout:
+    def environment(self) -> Layout:
         """Return what a schedule may change."""
         wrench = Field("F_e", (6,), "N, N m", "wrench on the end effector, world axes", kept=False)
         return sum((e.inputs() for e in self.elements), Layout((wrench,)))
@@ -152,10 +152,10 @@ class Plant:
         """Return (x, u, p) → (ẋ, powers)."""
         n = self.robot.n
         state = cs.SX.sym("x", 4 * n)
-        u = cs.SX.sym("u", n + self.surroundings.size)
+        u = cs.SX.sym("u", n + self.environment.size)
         p, m = self.parameters.symbols("p")
         x = self.view(state)
-        flow = self.flow(x, u[:n], self.surroundings.view(u[n:]), m)
+        flow = self.flow(x, u[:n], self.environment.view(u[n:]), m)
         slope = cs.vertcat(x.dq, x.dtheta, flow.ddq, flow.ddtheta)
         powers = self.energies.stack(flow.powers)
         return cs.Function("plant", [state, u, p], [cs.densify(slope), cs.densify(powers)], {"cse": True})

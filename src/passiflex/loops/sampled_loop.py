@@ -21,7 +21,7 @@ from passiflex.sampled.controller import SampledController
 from passiflex.sampled.motors import limit_layout, limited
 from passiflex.sampled.rest import Rest
 from passiflex.sampled.sensors import Sensors
-from passiflex.sampled.signals import ControlParameters, Wish
+from passiflex.sampled.signals import ControlParameters, Setpoint
 
 AT_ONCE = 1e-7
 """Two instants closer than this are one [s], after millions of periods; a law claims a level when it reads."""
@@ -32,7 +32,7 @@ class SampledLoop:
     """Plant and controller as functions of flat vectors, ready for code generation.
 
     `plant.rhs` is the plant; `control` is (x, c, row, p) → (c, command, signals), one period; `outputs` is
-    (x, command, surroundings, p) → what is true then; `period` makes the rows; `watch` is
+    (x, command, environment, p) → what is true then; `period` makes the rows; `watch` is
     the witness at work.
     """
 
@@ -63,24 +63,24 @@ class SampledLoop:
         """Return the state of `control`: the sensors', the controller's, and the torque of the motors."""
         n = self.controller.law.robot.n
         told = "that the motors were last told to give"
-        torque = Field("given_torque", (n,), "N m", told, kept=False, acts=True)
+        torque = Field("applied_torque", (n,), "N m", told, kept=False, acts=True)
         return self.sensors.state + self.controller.state + Layout((torque,))
 
     def start(self, at: Rest) -> NDArray[np.float64]:
         """Return the memory at rest, flat."""
         return self.memory.pack(
-            self.sensors.start(at) | self.controller.start(at) | {"given_torque": at.command}
+            self.sensors.start(at) | self.controller.start(at) | {"applied_torque": at.command}
         )
 
     @cached_property
     def period(self) -> PeriodRow:
         """Return how the row of a period comes about."""
         law = self.controller.law
-        return PeriodRow(law.robot.n, law.task.size, self.plant.surroundings)
+        return PeriodRow(law.robot.n, law.task.size, self.plant.environment)
 
     @property
     def row(self) -> Layout:
-        """Return what is told anew in every period; the surroundings come first."""
+        """Return what is told anew in every period; the environment come first."""
         return self.period.layout
 
     @cached_property
@@ -133,7 +133,7 @@ class SampledLoop:
         tau_e = robot.arm.jacobian(x.q, views.plant).T @ wrench
         true = Measurement(x.q, x.theta, x.dq, x.dtheta, tau_a, wrench, tau_e)
         y, read = self.sensors.read(true, w.torque_noise, w.elapsed, c, views.sensors)
-        wish = Wish(
+        setpoint = Setpoint(
             EndEffectorPose(w.desired_position, w.desired_rotation),
             w.desired_velocity,
             w.desired_acceleration,
@@ -144,10 +144,12 @@ class SampledLoop:
         told = ControlParameters(*(getattr(views, part) for part in ControlParameters._fields))
         start = self.sensors.state.size
         own = memory[start : start + self.controller.state.size]
-        command, after, entry, believed = self.controller.step(y, wish, w.elapsed, c.given_torque, own, told)
+        command, after, entry, believed = self.controller.step(
+            y, setpoint, w.elapsed, c.applied_torque, own, told
+        )
         limits = views.limits
         given = limited(
-            command.tau_m, c.given_torque, limits.torque_limit, limits.torque_rate_limit, w.elapsed
+            command.tau_m, c.applied_torque, limits.torque_limit, limits.torque_rate_limit, w.elapsed
         )
         claim = command.energy
         signals = self.signals.stack(
@@ -182,10 +184,10 @@ class SampledLoop:
 
     @cached_property
     def outputs(self) -> cs.Function:
-        """Return (x, command, surroundings, p) → `truth`, with p as for `control`."""
+        """Return (x, command, environment, p) → `truth`, with p as for `control`."""
         robot = self.controller.law.robot
         state, command = cs.SX.sym("x", 4 * robot.n), cs.SX.sym("command", robot.n)
-        surroundings, s = self.plant.surroundings.symbols("s")
+        environment, s = self.plant.environment.symbols("s")
         p = cs.SX.sym("p", self.parameters.size)
         views, x = self.parameters.view(p), self.plant.view(state)
         powers = self.plant.flow(x, command, s, views.plant).powers
@@ -193,7 +195,7 @@ class SampledLoop:
             "carried_energy": robot.arm.potential_energy(x.q, views.model),
             **{f"{name}_power": power for name, power in powers.items()},
         }
-        told = [state, command, surroundings, p]
+        told = [state, command, environment, p]
         return cs.Function("truth", told, [cs.densify(self.truth.stack(true))], {"cse": True})
 
     @cached_property

@@ -1,7 +1,7 @@
 /* A sampled loop: a generated control function once per period, a generated plant under held commands.
  *
- * control(x, c, row, p) -> (c, command, z) and plant(x, [command, surroundings], p) -> (dx, dquad).
- * Row i of rows (n_w numbers, the first n_s of them the surroundings that the plant feels) holds during
+ * control(x, c, row, p) -> (c, command, z) and plant(x, [command, environment], p) -> (dx, dquad).
+ * Row i of rows (n_w numbers, the first n_s of them the environment that the plant feels) holds during
  * period i. timing holds two numbers per row: the delay after which the command of this sample reaches the
  * plant, and whether the controller runs at all (0: a missed period, all stays as it was). Commands arrive
  * in order. line holds the commands on their way: their number, the one in force, then (time left, command)

@@ -57,9 +57,9 @@ class _Call(NamedTuple):
 
 
 class HeldLoop:
-    """Advances control(x, c, row, p) → (c, command, signals) and plant(x, [command, surroundings], p) → (dx, dquad).
+    """Advances control(x, c, row, p) → (c, command, signals) and plant(x, [command, environment], p) → (dx, dquad).
 
-    The first numbers of a row are the surroundings that the plant feels. Threads may share the object if
+    The first numbers of a row are the environment that the plant feels. Threads may share the object if
     it is compiled.
 
     Parameters
@@ -81,7 +81,7 @@ class HeldLoop:
             raise SizeError(
                 "plant and control do not fit",
                 got=f"{plant}, {control}",
-                needs="(x, [command, surroundings], p) -> (dx, dquad) and (x, c, row, p) -> (c, command, signals), "
+                needs="(x, [command, environment], p) -> (dx, dquad) and (x, c, row, p) -> (c, command, signals), "
                 "dense columns",
             )
         self.n_x, inputs, self.n_p = (plant.size1_in(i) for i in range(3))

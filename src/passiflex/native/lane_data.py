@@ -17,11 +17,11 @@ REGISTER = 64
 
 
 class Change(NamedTuple):
-    """From this period on, a lane is told these numbers."""
+    """From this period on, a lane is scheduled these numbers."""
 
     period: int
     lane: int
-    told: Array
+    scheduled: Array
 
 
 class LaneState(NamedTuple):
@@ -32,7 +32,7 @@ class LaneState(NamedTuple):
     y: States of the plants and their quadratures.
     controller, signals: As of `LoopState`.
     line: Commands on their way, a row for each lane.
-    told: What was told last.
+    scheduled: What was scheduled last.
     watched: What the watch remembers.
     """
 
@@ -40,7 +40,7 @@ class LaneState(NamedTuple):
     controller: Array
     signals: Array
     line: Array
-    told: Array
+    scheduled: Array
     watched: Array
 
 
@@ -67,7 +67,7 @@ class LaneInputs(NamedTuple):
     Attributes
     ----------
     first: Number of its first period.
-    changes: What is told anew in it, by period.
+    changes: What is scheduled anew in it, by period.
     drawn: Numbers of chance (N, n_drawn, lanes).
     timing: Delay of each command [s] ≥ 0, and whether the controller runs (N, 2, lanes).
     """

@@ -1,11 +1,11 @@
 /* The loop of held_loop.c for several robots side by side, each in its own lane.
  *
  * The text before this one defines, for lanes, the generated functions and their sizes:
- *   PLANT(x, [command, surroundings], p) -> (dx, dquad)      CONTROL(x, c, row, p) -> (c, command, z)
- *   ROW(time, told, drawn) -> row                            TRUTH(x, command, surroundings, p) -> truth
+ *   PLANT(x, [command, environment], p) -> (dx, dquad)      CONTROL(x, c, row, p) -> (c, command, z)
+ *   ROW(time, scheduled, drawn) -> row                            TRUTH(x, command, environment, p) -> truth
  *   LOOK(w, time, y, command in force, c, z, p) -> w and GLANCE(w, time, y, p) -> w, if N_M is not 0, as in held_loop.c
- * What is told to a lane changes at single periods (changes, in the order of periods: period, lane, and where
- * in told_values its numbers stand); drawn are the numbers that chance gives to each period. timing holds for
+ * What is scheduled to a lane changes at single periods (changes, in the order of periods: period, lane, and where
+ * in scheduled_values its numbers stand); drawn are the numbers that chance gives to each period. timing holds for
  * each period and lane the delay of the command and whether the controller runs. Each lane keeps its own line
  * of commands on their way, its own longest step, and steps from arrival to arrival just as it would alone;
  * a lane that has finished its period waits for the others.
@@ -16,10 +16,10 @@
 typedef struct {
     long long first, n_rows, steps, record_every, n_changes, n_kept;
     double period;
-    lanes *y, *c, *told, *z, *w;
+    lanes *y, *c, *scheduled, *z, *w;
     double *line, *longest;
     const long long* changes;
-    const double* told_values;
+    const double* scheduled_values;
     const lanes* drawn;
     const double* timing;
     const lanes *p_plant, *p_control, *p_watch;
@@ -165,9 +165,9 @@ LANE_EXPORT void passiflex_lane_loop(const passiflex_lane_run* r)
         const double* timing = r->timing + k * 2 * LANES;
         lane_bits runs;
         for (; change < r->changes + 3 * r->n_changes && change[0] <= r->first + k; change += 3)
-            for (int i = 0; i < N_TOLD; i++) LANE(r->told[i], change[1]) = r->told_values[change[2] * N_TOLD + i];
+            for (int i = 0; i < N_SCHEDULED; i++) LANE(r->scheduled[i], change[1]) = r->scheduled_values[change[2] * N_SCHEDULED + i];
         time = all_lanes((double)(r->first + k) * r->period);
-        ROW(&time, r->told, r->drawn + k * N_DRAWN, row);
+        ROW(&time, r->scheduled, r->drawn + k * N_DRAWN, row);
         CONTROL(r->y, r->c, row, r->p_control, next, command, said);
         EACH_LANE LANE(runs, l) = timing[LANES + l] != 0.0 ? -1 : 0;
         for (int i = 0; i < N_C; i++) r->c[i] = where(runs, next[i], r->c[i]);

@@ -28,7 +28,7 @@ class _Run(ctypes.Structure):
         *(
             (name, ctypes.c_void_p)
             for name in (
-                "y", "c", "told", "z", "w", "line", "longest", "changes", "told_values", "drawn", "timing",
+                "y", "c", "scheduled", "z", "w", "line", "longest", "changes", "scheduled_values", "drawn", "timing",
                 "p_plant", "p_control", "p_watch", "kept", "out", "completed", "whole",
             )
         ),
@@ -40,10 +40,10 @@ class LaneFunctions(NamedTuple):
 
     Attributes
     ----------
-    plant: (x, [command, surroundings], p) → (dx, dquad).
-    control: (x, c, row, p) → (c, command, signals); a row begins with the surroundings.
-    row: (time, told, drawn) → row.
-    truth: (x, command, surroundings, p) → what is true then, with p as for control.
+    plant: (x, [command, environment], p) → (dx, dquad).
+    control: (x, c, row, p) → (c, command, signals); a row begins with the environment.
+    row: (time, scheduled, drawn) → row.
+    truth: (x, command, environment, p) → what is true then, with p as for control.
     watch: What sees every sample and every step, or none.
     """
 
@@ -87,7 +87,7 @@ class LaneLoop:
         self.n_x, self.n_q = f.plant.size1_out(0), f.plant.size1_out(1)
         self.n_c, self.n_u, self.n_z = (f.control.size1_out(i) for i in range(3))
         self.n_s = f.plant.size1_in(1) - self.n_u
-        self.n_told, self.n_drawn, self.n_w = f.row.size1_in(1), f.row.size1_in(2), f.row.size1_out(0)
+        self.n_scheduled, self.n_drawn, self.n_w = f.row.size1_in(1), f.row.size1_in(2), f.row.size1_out(0)
         self.n_p_plant, self.n_p_control = f.plant.size1_in(2), f.control.size1_in(3)
         self.n_truth = f.truth.size1_out(0)
         self.n_m, self.n_p_watch = (f.watch.size, f.watch.parameters) if f.watch is not None else (0, 0)
@@ -124,7 +124,7 @@ class LaneLoop:
             np.stack([s.controller for s in states], axis=1),
             np.stack([s.signals for s in states], axis=1),
             np.stack([s.line for s in states]),
-            np.zeros((self.n_told, self.width)),
+            np.zeros((self.n_scheduled, self.width)),
             np.stack([s.watched for s in states], axis=1),
         )
 
@@ -183,7 +183,7 @@ class LaneLoop:
             "c": aligned("controller", state.controller, (self.n_c, w)),
             "z": aligned("signals", state.signals, (self.n_z, w)),
             "line": aligned("line", state.line, (w, self.n_line)),
-            "told": aligned("told", state.told, (self.n_told, w)),
+            "scheduled": aligned("scheduled", state.scheduled, (self.n_scheduled, w)),
             "w": aligned("watched", state.watched, (self.n_m, w)),
             "drawn": aligned("drawn", inputs.drawn, (n, self.n_drawn, w)),
             "timing": aligned("timing", inputs.timing, (n, 2, w)),
@@ -196,25 +196,25 @@ class LaneLoop:
             "out": aligned("out", None, (-(-n // record_every), kept.size, w)),
         }
         changes = sorted(inputs.changes, key=lambda change: change.period)
-        told = np.zeros((len(changes), self.n_told))
+        scheduled = np.zeros((len(changes), self.n_scheduled))
         for i, c in enumerate(changes):
-            told[i] = aligned("told in a change", c.told, (self.n_told,))
+            scheduled[i] = aligned("scheduled in a change", c.scheduled, (self.n_scheduled,))
         when = np.array([(c.period, c.lane, i) for i, c in enumerate(changes)], dtype=np.int64)
         kept = np.ascontiguousarray(kept, dtype=np.int64)
         completed, whole = np.zeros(w, dtype=np.int64), np.zeros(w, dtype=np.int64)
         run = _Run(
             inputs.first, n, n - last, record_every, len(changes), kept.size, period,
-            changes=address(when), told_values=address(told), kept=address(kept),
+            changes=address(when), scheduled_values=address(scheduled), kept=address(kept),
             completed=address(completed), whole=address(whole), **{name: address(a) for name, a in arrays.items()},
         )  # fmt: skip
         self._routine(ctypes.byref(run))
-        after = LaneState(*(arrays[name] for name in ("y", "c", "z", "line", "told", "w")))
+        after = LaneState(*(arrays[name] for name in ("y", "c", "z", "line", "scheduled", "w")))
         return LaneSamples(arrays["out"], completed, whole, after)
 
     def _source(self, f: LaneFunctions, width: int | None) -> str:
         sizes = {
             "N_X": self.n_x, "N_Q": self.n_q, "N_C": self.n_c, "N_U": self.n_u, "N_S": self.n_s,
-            "N_Z": self.n_z, "N_W": self.n_w, "N_TOLD": self.n_told, "N_DRAWN": self.n_drawn,
+            "N_Z": self.n_z, "N_W": self.n_w, "N_SCHEDULED": self.n_scheduled, "N_DRAWN": self.n_drawn,
             "N_TRUTH": self.n_truth, "LONGEST_LINE": LONGEST_LINE,
         }  # fmt: skip
         lines = [f"enum {{ {', '.join(f'{name} = {size}' for name, size in sizes.items())} }};"]
@@ -236,7 +236,7 @@ def _require_fit(f: LaneFunctions, n: LaneLoop) -> None:
     needed = {
         "plant": ((n.n_x, n.n_u + n.n_s, n.n_p_plant), (n.n_x, n.n_q)),
         "control": ((n.n_x, n.n_c, n.n_w, n.n_p_control), (n.n_c, n.n_u, n.n_z)),
-        "row": ((1, n.n_told, n.n_drawn), (n.n_w,)),
+        "row": ((1, n.n_scheduled, n.n_drawn), (n.n_w,)),
         "truth": ((n.n_x, n.n_u, n.n_s, n.n_p_control), (n.n_truth,)),
     }
     if f.watch is not None:
@@ -250,4 +250,4 @@ def _require_fit(f: LaneFunctions, n: LaneLoop) -> None:
         if found != sizes or not all(part.is_dense() for side in parts for part in side):
             raise SizeError(f"{name} does not fit", got=g, needs=f"dense columns of sizes {sizes}")
     if not 0 <= n.n_s <= n.n_w:
-        raise SizeError("rows do not fit", got=f"{n.n_w} numbers", needs=f"{n.n_s} surroundings first")
+        raise SizeError("rows do not fit", got=f"{n.n_w} numbers", needs=f"{n.n_s} environment first")

@@ -10,7 +10,7 @@ import numpy as np
 from passiflex.campaigns.intervals import Share
 from passiflex.campaigns.measures import MEASURES
 from passiflex.campaigns.page import Band, Bars, Ecdf, Page, Scatter
-from passiflex.plotting.figures import Curve
+from passiflex.plotting.figures import Series
 from passiflex.plotting.style import BLUE, LINES, ROLES, axis_label, figure_style
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ MORE, LESS, DIFFERENT = (ROLES[role].light for role in ("passive", "violated", "
 """Colours of the bars: the metric rises with the parameter, falls, differs between words."""
 
 
-def draw_campaign(page: Page, lines: Mapping[str, Curve] | None = None) -> Figure:
+def draw_campaign(page: Page, lines: Mapping[str, Series] | None = None) -> Figure:
     """Return the page, A4 portrait.
 
     Parameters
@@ -91,7 +91,7 @@ def _shares(axes: Axes, shares: tuple[Share, ...]) -> None:
     axes.set_title("shares, and their intervals")
 
 
-def _band(axes: Axes, band: Band | None, lines: Mapping[str, Curve]) -> None:
+def _band(axes: Axes, band: Band | None, lines: Mapping[str, Series]) -> None:
     axes.set_title("responses")
     if band is None:
         _nothing(axes, "no responses to a step were kept")

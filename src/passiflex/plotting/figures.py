@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 AXES = "XYZ"
 
 
-class Curve(NamedTuple):
+class Series(NamedTuple):
     """A signal over time."""
 
     time: Array
@@ -31,7 +31,7 @@ class StepColumn(NamedTuple):
     """One column of Figs. 1 and 3: curves (N, 3) in m by the names of `LINES`."""
 
     title: str
-    curves: Mapping[str, Curve]
+    curves: Mapping[str, Series]
 
 
 class CircleColumn(NamedTuple):

@@ -8,9 +8,9 @@ import textwrap
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
+from passiflex.diagrams import Mark, Panel, Span, Viewed, panels
 from passiflex.errors import RunFileError
 from passiflex.plotting.style import ROLES, SHADE, Size, axis_label, figure_style, line, size_of
-from passiflex.views import Mark, Panel, Span, Viewed, panels
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist

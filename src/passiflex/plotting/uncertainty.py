@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from passiflex.campaigns.intervals import Share
 from passiflex.campaigns.page import Band, Ecdf
 from passiflex.plotting.campaign import draw_band
-from passiflex.plotting.figures import Curve
+from passiflex.plotting.figures import Series
 from passiflex.plotting.style import BLUE, JOINTS, LINES, axis_label, figure_style
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ class UncertainColumn(NamedTuple):
     end: float
     shares: tuple[Share, ...]
     band: Band | None
-    ideal: Curve
+    ideal: Series
     overshoot: Ecdf
     margin: Ecdf
 

@@ -11,8 +11,8 @@ import numpy as np
 import yaml
 from numpy.typing import ArrayLike, NDArray
 
+from passiflex.control.motion import Motion, Pose, pose_at, shifted
 from passiflex.errors import NameUnknownError, ValueRangeError
-from passiflex.loops.motion import Motion, Pose, pose_at, shifted
 from passiflex.loops.parts import Parts
 from passiflex.problems.posture import posture
 from passiflex.problems.problem import Problem, Sampling

@@ -9,9 +9,9 @@ import casadi as cs
 import numpy as np
 from numpy.typing import NDArray
 
+from passiflex.control.motion import Pose
 from passiflex.control.task import AbstractTask
 from passiflex.errors import ValueRangeError
-from passiflex.loops.motion import Pose
 from passiflex.problems.problem import Problem
 from passiflex.robots.arm import EndEffectorPose, SerialArm
 from passiflex.robots.flexible import FlexibleJointRobot

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from passiflex.control.law import AbstractLaw
-from passiflex.loops.motion import Motion, Pose
+from passiflex.control.motion import Motion, Pose
 from passiflex.loops.plant import Elements
 from passiflex.loops.sampled_loop import SampledLoop
 from passiflex.sampled.controller import SampledController
@@ -51,7 +51,7 @@ class GainChange(NamedTuple):
     damping: Array
 
 
-class Interval(NamedTuple):
+class Lasting(NamedTuple):
     """From `start` on, before `end` [s], these numbers hold in the rows of a sampled loop."""
 
     start: float
@@ -69,7 +69,7 @@ class Sampling:
     elements: What touches the robot.
     period, delay, jitter: [s].
     missed: Share of periods in which the law does not run.
-    insist: Whether to run a loop that is unstable by the limit map.
+    allow_unstable: Whether to run a loop that is unstable by the limit map.
     numbers: Flat vector of `SampledLoop.parameters`.
     plant: Flat vector of `Plant.parameters`, the first part of it.
     held: Motor torque at the start (n,).
@@ -84,13 +84,13 @@ class Sampling:
     delay: float
     jitter: float
     missed: float
-    insist: bool
+    allow_unstable: bool
     numbers: Array
     plant: Array
     held: Array
     gains: tuple[GainChange, ...]
-    feedforward: tuple[Interval, ...]
-    drags: tuple[Interval, ...]
+    feedforward: tuple[Lasting, ...]
+    drags: tuple[Lasting, ...]
 
     @cached_property
     def loop(self) -> SampledLoop:

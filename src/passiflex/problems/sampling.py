@@ -16,7 +16,7 @@ from passiflex.loops.plant import touching
 from passiflex.loops.sampled_loop import SampledLoop
 from passiflex.problems.gains import sized
 from passiflex.problems.posture import Posture
-from passiflex.problems.problem import GainChange, Interval, Sampling
+from passiflex.problems.problem import GainChange, Lasting, Sampling
 from passiflex.robots.flexible import FlexibleJointRobot
 from passiflex.sampled.controller import SampledController
 from passiflex.sampled.external import (
@@ -93,7 +93,7 @@ def sampling(
     }
     elements = touching(
         friction=any(np.any(friction[f"{kind}_friction"]) for kind in ("coulomb", "viscous")),
-        drag=any(d.viscous or d.dry for d in scenario.drags),
+        drag=any(d.viscous or d.dry for d in scenario.environment),
     )
     parts = SampledLoop(controller, elements).parameters
     moved = np.diag(start.mass_matrix) + gains.get("shaped_inertia", model["motor_inertia"])
@@ -121,15 +121,15 @@ def sampling(
         delay=control.delay,
         jitter=control.jitter,
         missed=control.missed,
-        insist=control.insist,
+        allow_unstable=control.allow_unstable,
         numbers=numbers,
         plant=numbers[parts.slices["plant"]],
         held=start.gravity_torque,
         gains=_gain_changes(scenario, gains),
         feedforward=tuple(
-            Interval(f.start, f.end, np.array([*f.force, *f.moment])) for f in scenario.feedforward
+            Lasting(f.start, f.end, np.array([*f.force, *f.moment])) for f in scenario.feedforward
         ),
-        drags=tuple(Interval(d.start, d.end, np.array([d.viscous, d.dry])) for d in scenario.drags),
+        drags=tuple(Lasting(d.start, d.end, np.array([d.viscous, d.dry])) for d in scenario.environment),
     )
 
 
@@ -247,7 +247,7 @@ def _limits(motors: MotorSettings, robot: FlexibleJointRobot) -> dict[str, Array
 def _gain_changes(scenario: Scenario, gains: dict[str, Array]) -> tuple[GainChange, ...]:
     stiffness, damping = gains["stiffness"], gains["damping"]
     changes = []
-    for change in scenario.gains:
+    for change in scenario.gain_changes:
         stiffness = stiffness if change.stiffness is None else change.stiffness.full()
         damping = damping if change.damping is None else change.damping.full()
         changes.append(GainChange(change.at, change.at + change.duration, stiffness, damping))

@@ -6,11 +6,10 @@ from fractions import Fraction
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
-from passiflex.loops.motion import Motion, Pose, circle, hold, minimum_jerk, pose_at
+from passiflex.control.motion import Motion, Pose, hold, pose_at
 from passiflex.problems.problem import Event
-from passiflex.scenarios.scenario import Circle, Force, Move, Scenario, Step
+from passiflex.scenarios.scenario import Force, Scenario
 
 Array = NDArray[np.float64]
 
@@ -32,17 +31,7 @@ def _motions(scenario: Scenario, home: Pose) -> dict[float, Motion]:
     began = 0.0
     for event in scenario.reference:
         now = pose_at(motions[began], event.at - began)
-        if isinstance(event, Step):
-            turned = Rotation.from_rotvec(event.turn).as_matrix() @ now.rotation
-            motion = hold(Pose(now.position + np.array(event.by), turned))
-        elif isinstance(event, Move):
-            motion = minimum_jerk(now, event.by, event.duration)
-        elif isinstance(event, Circle):
-            first, second = (np.eye(3)["xyz".index(a)] for a in event.plane)
-            motion = circle(now, first, second, event.radius, event.period)
-        else:
-            motion = hold(now)
-        motions[event.at] = motion
+        motions[event.at] = event.build(now)
         began = event.at
     return motions
 

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from passiflex.diagrams import Mark, Panel, Span
 from passiflex.reports.arrays import Arrays
 from passiflex.reports.thinning import CLOSE, Bins
-from passiflex.views import Mark, Panel, Span
 
 Array = NDArray[np.float64]
 

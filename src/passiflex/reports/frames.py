@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from passiflex.diagrams import Viewed
+from passiflex.diagrams.viewed import first_finite
 from passiflex.reports.arm import same_kinematics
 from passiflex.reports.arrays import Arrays
 from passiflex.reports.thinning import frame_rows
 from passiflex.robots import SerialChain
 from passiflex.runs.run_arm import chain_of
 from passiflex.simulation import Run
-from passiflex.views import Viewed
-from passiflex.views.viewed import first_finite
 
 Array = NDArray[np.float64]
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
+from passiflex.diagrams import KINDS, Viewed, marks_of, panels, roles_of, spans_of, viewed
+from passiflex.diagrams.events import scenario_of
 from passiflex.passivity import audit_if_possible
 from passiflex.plotting.style import ROLES, Role
 from passiflex.reports.arm import arm_header
@@ -15,8 +17,6 @@ from passiflex.reports.frames import frames_header, ghosts_header
 from passiflex.reports.metrics import metrics_header, verdict_header
 from passiflex.runs.run_arm import chain_of
 from passiflex.simulation import Run
-from passiflex.views import KINDS, Viewed, marks_of, panels, roles_of, spans_of, viewed
-from passiflex.views.events import scenario_of
 
 FORMAT = "passiflex report 1"
 NO_ARM = "The arm is not drawn: the file does not say its kinematics."

@@ -7,13 +7,13 @@ from collections.abc import Sequence
 from typing import Any
 
 from passiflex.campaigns.measures import MEASURES, measures
+from passiflex.diagrams.events import scenario_of
 from passiflex.errors import PassiflexError
 from passiflex.loops.witness import ROUND_OFF
 from passiflex.passivity import Audit, audit_if_possible
 from passiflex.responses.steps import step_window
 from passiflex.runs.run_arm import problem_of
 from passiflex.simulation import Run
-from passiflex.views.events import scenario_of
 
 WORDS = {
     "verdict": "did law and motors ever give the links more than was there?",

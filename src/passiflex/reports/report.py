@@ -7,6 +7,7 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
+from passiflex.diagrams import Viewed
 from passiflex.errors import ArgumentError
 from passiflex.files import OutputError, whole_file
 from passiflex.reports.header import content
@@ -14,7 +15,6 @@ from passiflex.reports.page import page_text
 from passiflex.reports.screen import open_in_browser
 from passiflex.reports.viewer import read_viewer
 from passiflex.simulation import Run
-from passiflex.views import Viewed
 
 ENDINGS = (".html", ".htm")
 

@@ -8,7 +8,7 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
-from passiflex.loops.motion import DEGREE, Motion, pose_at
+from passiflex.control.motion import DEGREE, Motion, pose_at
 from passiflex.problems.problem import Event
 
 Array = NDArray[np.float64]

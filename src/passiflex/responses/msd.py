@@ -9,7 +9,7 @@ import numpy as np
 import scipy.integrate
 from numpy.typing import NDArray
 
-from passiflex.loops.motion import Motion, pose_at
+from passiflex.control.motion import Motion, pose_at
 from passiflex.problems.problem import Event
 
 Array = NDArray[np.float64]

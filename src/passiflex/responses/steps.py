@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from passiflex.responses.metrics import overshoot, rms, settling_time
-from passiflex.scenarios.scenario import Scenario, Step
+from passiflex.scenarios.reference import Step
+from passiflex.scenarios.scenario import Scenario
 
 Array = NDArray[np.float64]
 
@@ -28,9 +29,9 @@ def step_window(scenario: Scenario) -> StepWindow | None:
     if step is None:
         return None
     times = [e.at for e in scenario.reference] + [
-        t for c in scenario.gains for t in (c.at, c.at + c.duration)
+        t for c in scenario.gain_changes for t in (c.at, c.at + c.duration)
     ]
-    for entries in (scenario.forces, scenario.feedforward, scenario.drags):
+    for entries in (scenario.forces, scenario.feedforward, scenario.environment):
         times += [t for entry in entries for t in (entry.start, entry.end)]
     size = float(np.linalg.norm(step.by))
     end = min([t for t in times if t > step.at] + [scenario.duration])

@@ -27,14 +27,14 @@ class Body(NamedTuple):
     inertia: Array
 
 
-class Pose(NamedTuple):
+class Placement(NamedTuple):
     """Position and orientation of a frame in the frame of its moving link."""
 
     xyz: Array
     rotation: Array
 
 
-HERE = Pose(np.zeros(3), np.eye(3))
+HERE = Placement(np.zeros(3), np.eye(3))
 for _array in HERE:
     _array.setflags(write=False)
 
@@ -63,7 +63,7 @@ def components(tensor: Array) -> Array:
     return tensor[np.triu_indices(3)]
 
 
-def turned(body: Body, pose: Pose) -> Body:
+def turned(body: Body, pose: Placement) -> Body:
     """Return a body, given in the frame at `pose`, in the frame in which `pose` is given."""
     R = pose.rotation
     return Body(body.mass, pose.xyz + R @ body.com, components(R @ matrix(body.inertia) @ R.T))

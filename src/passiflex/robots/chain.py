@@ -22,7 +22,7 @@ from passiflex.robots.bodies import (
     HERE,
     Array,
     Body,
-    Pose,
+    Placement,
     check_body,
     lumped,
     rotation_of,
@@ -200,7 +200,7 @@ def _hardly(links: Iterable[str], inertials: dict[str, Body]) -> Iterator[str]:
             yield f"{what}: {moments}; a digit or a decimal point may be missing in its <inertia>"
 
 
-def _rigid_part(link: str, children: dict[str, list[Edge]]) -> tuple[dict[str, Pose], list[Edge]]:
+def _rigid_part(link: str, children: dict[str, list[Edge]]) -> tuple[dict[str, Placement], list[Edge]]:
     """Return the poses of all links fixed to `link`, in its frame, and the moving joints that leave them."""
     poses, leaving = {link: HERE}, []
     queue = [link]
@@ -208,14 +208,14 @@ def _rigid_part(link: str, children: dict[str, list[Edge]]) -> tuple[dict[str, P
         for edge in children[parent]:
             if edge.fixed:
                 (xyz, R), joint = poses[parent], edge.joint
-                poses[edge.child] = Pose(xyz + R @ joint.xyz, R @ rotation_of(joint.rpy))
+                poses[edge.child] = Placement(xyz + R @ joint.xyz, R @ rotation_of(joint.rpy))
                 queue.append(edge.child)
             else:
                 leaving.append(edge)
     return poses, leaving
 
 
-def _seen_from(parent: Pose, joint: Joint) -> Joint:
+def _seen_from(parent: Placement, joint: Joint) -> Joint:
     """Return the joint with its origin in the frame in which `parent` is given."""
     if parent is HERE:
         return joint
@@ -223,7 +223,7 @@ def _seen_from(parent: Pose, joint: Joint) -> Joint:
     return joint._replace(xyz=parent.xyz + parent.rotation @ joint.xyz, rpy=rpy)
 
 
-def _lump(link: str, poses: dict[str, Pose], inertials: dict[str, Body]) -> Body:
+def _lump(link: str, poses: dict[str, Placement], inertials: dict[str, Body]) -> Body:
     """Return all links that move with `link` as one body."""
     parts = []
     for name, pose in poses.items():
@@ -239,7 +239,7 @@ def _lump(link: str, poses: dict[str, Pose], inertials: dict[str, Body]) -> Body
 
 
 def _end_effector(
-    name: str | None, last: str, poses: dict[str, Pose], children: dict[str, list[Edge]]
+    name: str | None, last: str, poses: dict[str, Placement], children: dict[str, list[Edge]]
 ) -> str:
     """Return the link that carries the end-effector frame."""
     if name is None:

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from passiflex.errors import RobotError
-from passiflex.robots.bodies import ROUND_OFF, Array, Body, Pose, rotation_of, rpy_of, turned
+from passiflex.robots.bodies import ROUND_OFF, Array, Body, Placement, rotation_of, rpy_of, turned
 from passiflex.robots.urdf_words import refuse_unread
 from passiflex.robots.urdf_xml import ATTRIBUTES
 from passiflex.texts.quantity import shown
@@ -156,7 +156,7 @@ class PartReader:
             _numbers(text, 1, f"{where}: <inertia {key}=...>", most=LARGEST)[0] for key, text in texts.items()
         ]
         body = Body(float(mass), np.zeros(3), np.array(moments))
-        return turned(body, Pose(xyz, rotation_of(rpy)))
+        return turned(body, Placement(xyz, rotation_of(rpy)))
 
     def _first(self, element: ET.Element, tag: str, where: str) -> ET.Element | None:
         """Return the first element of a kind in another, None where there is none."""

@@ -156,7 +156,7 @@ def _refuse_change(run: Run, name: str, *value: object) -> NoReturn:
 Run.__setattr__ = Run.__delattr__ = _refuse_change  # type: ignore[assignment,method-assign]
 
 
-class Rows(NamedTuple):
+class Recorded(NamedTuple):
     """Recorded rows: what each column is, the numbers (N, size), and a suffix for the names."""
 
     layout: Layout
@@ -167,7 +167,7 @@ class Rows(NamedTuple):
 def assemble(
     problem: Problem,
     time: NDArray[np.float64],
-    recorded: Sequence[Rows],
+    recorded: Sequence[Recorded],
     events: list[dict[str, Any]],
     failure: str,
     noted: Noted,

@@ -1,4 +1,4 @@
-"""One control period: step(measurement, wish, elapsed, state, parameters) → (command, state, ledger entry)."""
+"""One control period: step(measurement, setpoint, elapsed, state, parameters) → (command, state, ledger entry)."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from passiflex.sampled.inner_loop import AbstractInnerLoop, PlainInnerLoop
 from passiflex.sampled.measurement_bound import booked_bound, bound_state, error_layout, sure, sure_state
 from passiflex.sampled.period_state import period_start, period_state
 from passiflex.sampled.rest import Remembered, Rest
-from passiflex.sampled.signals import ControlParameters, LedgerEntry, Step, Wish
+from passiflex.sampled.signals import ControlParameters, LedgerEntry, PeriodResult, Setpoint
 from passiflex.sampled.tank import AbstractTank, PeriodFlows, TankEntry, added, finite, unchanged
 
 LARGEST_READING = 1e30
@@ -81,21 +81,21 @@ class SampledController:
     def step(
         self,
         y: Measurement,
-        wish: Wish,
+        setpoint: Setpoint,
         elapsed: cs.SX,
-        given: cs.SX,
+        applied: cs.SX,
         state: cs.SX,
         p: ControlParameters,
-    ) -> Step:
+    ) -> PeriodResult:
         """Return command, next state and ledger entry, `elapsed` seconds after the last period that ran.
 
-        `given` (n,) is the torque that the motors were told then, after their limits.
+        `applied` (n,) is the torque that the motors were told then, after their limits.
         """
         arm, s = self.law.robot.arm, self.state.view(state)
-        ok = finite(elapsed, given, *y, *wish.pose, *wish[1:], below=LARGEST_READING)
+        ok = finite(elapsed, applied, *y, *setpoint.pose, *setpoint[1:], below=LARGEST_READING)
         elapsed = s.lost_time + cs.if_else(finite(elapsed, below=LARGEST_READING), elapsed, 0)
         y, observed = self.external.estimate(y, elapsed, Known(arm, p.model, p.observer.bandwidth), s)
-        y, seen = self.inner.see(y, given, elapsed, s, p.model, p.inner)
+        y, seen = self.inner.see(y, applied, elapsed, s, p.model, p.inner)
         first = s.running < 1
 
         held = EndEffectorPose(s.governed_position, s.governed_rotation)
@@ -131,18 +131,18 @@ class SampledController:
         rebased, lowest = cs.if_else(overdrawn, storage - restored, 0), settled.level
         settled = settled._replace(level=settled.level + rebased)
 
-        granted = self._grant(now, held, held_stiffness, wish, latched, settled.level, doubt, elapsed, p)
+        granted = self._grant(now, held, held_stiffness, setpoint, latched, settled.level, doubt, elapsed, p)
         valve = (
             (1 - latched) * self.tank.valve(granted.entry.level - doubt, p.tank) if self.tank else cs.SX(1)
         )
-        g.stiffness, g.damping = granted.stiffness, cs.if_else(latched, p.fallback.damping, wish.damping)
+        g.stiffness, g.damping = granted.stiffness, cs.if_else(latched, p.fallback.damping, setpoint.damping)
         torque = cs.SX.zeros(self.law.robot.n)
         if self.actions:
-            torque += valve * self._actions(y, now, wish, granted, g, p)
+            torque += valve * self._actions(y, now, setpoint, granted, g, p)
         if self.tank:
             brake = self.tank.braking(granted.entry.level, cs.dot(now.dphi, now.dphi), elapsed, p.tank)
             torque -= brake * now.dphi
-        reference, memory = Reference(granted.pose, wish.velocity), self.inner.state(self.law.robot.n)
+        reference, memory = Reference(granted.pose, setpoint.velocity), self.inner.state(self.law.robot.n)
         command = self.inner.command(self.law, y, reference, p.model, g, torque, memory.view(seen), p.inner)
 
         tank = added(settled, granted.entry)
@@ -191,7 +191,7 @@ class SampledController:
             fault=1 - ok,
         )
         safe = command._replace(tau_m=cs.if_else(ok, command.tau_m, s.last_command))
-        return Step(safe, cs.if_else(ok, after, faulty), entry, y)
+        return PeriodResult(safe, cs.if_else(ok, after, faulty), entry, y)
 
     def _potential(self, at: Stored, reference: EndEffectorPose, stiffness: cs.SX) -> cs.SX:
         return self.law.task.potential(at.pose, reference, stiffness)
@@ -201,7 +201,7 @@ class SampledController:
         now: Stored,
         held: EndEffectorPose,
         held_stiffness: cs.SX,
-        wish: Wish,
+        setpoint: Setpoint,
         latched: cs.SX,
         level: cs.SX,
         doubt: cs.SX,
@@ -211,13 +211,15 @@ class SampledController:
         """Return the reference as far as the tank surely pays for it; a law that has fallen back holds its own."""
         one = cs.SX(1)
         if self.tank is None:
-            stored = self._potential(now, wish.pose, wish.stiffness)
+            stored = self._potential(now, setpoint.pose, setpoint.stiffness)
             cost = stored - self._potential(now, held, held_stiffness)
-            return _Granted(wish.pose, wish.stiffness, one, one, cost, unchanged(level))
+            return _Granted(setpoint.pose, setpoint.stiffness, one, one, cost, unchanged(level))
         task, tank = self.law.task, self.tank
         share = tank.stiffness_share(level - doubt, p.tank)
         wanted = cs.if_else(
-            share < 1, p.gains.stiffness + share * (wish.stiffness - p.gains.stiffness), wish.stiffness
+            share < 1,
+            p.gains.stiffness + share * (setpoint.stiffness - p.gains.stiffness),
+            setpoint.stiffness,
         )
         wanted = cs.if_else(latched, held_stiffness, wanted)
         signed = p.tank.tank_signed
@@ -225,7 +227,7 @@ class SampledController:
         stiffness = govern_stiffness(task, now.pose, held, held_stiffness, wanted, budget, signed)
         first = tank.pay(level, stiffness.cost, p.tank)
         budget = cs.fmax(budget - first.granted, 0)
-        goal = _pose(latched, held, wish.pose)
+        goal = _pose(latched, held, setpoint.pose)
         pose = govern_pose(task, now.pose, held, goal, stiffness.value, budget, signed)
         second = tank.pay(first.level, pose.cost, p.tank)
         return _Granted(
@@ -241,7 +243,7 @@ class SampledController:
         self,
         y: Measurement,
         now: Stored,
-        wish: Wish,
+        setpoint: Setpoint,
         granted: _Granted,
         g: SimpleNamespace,
         p: ControlParameters,
@@ -250,7 +252,7 @@ class SampledController:
         arm, rows = self.law.robot.arm, slice(0, self.law.task.size)
         S, held, a = self.law.task.basis(granted.pose), list(self.law.task.held), p.actions
         M, J = arm.mass_matrix(y.q, p.model), S.T @ arm.jacobian(y.q, p.model)[rows, :]
-        velocity, acceleration = S.T @ wish.velocity[rows], S.T @ wish.acceleration[rows]
+        velocity, acceleration = S.T @ setpoint.velocity[rows], S.T @ setpoint.acceleration[rows]
         follow = granted.pose_share * tracking_wrench(
             M, J, g.damping[held, held], velocity, acceleration, g.regularisation, a
         )
@@ -259,7 +261,7 @@ class SampledController:
         moving = M + cs.diag(self.law.motors(p.model, g))
         error = S.T @ self.law.task.error(now.pose, granted.pose)
         posture = posture_spring(moving, J_held, error, now.phi, now.dphi, g.regularisation, a)
-        return at_end.T @ wish.wrench + J_held.T @ follow + posture
+        return at_end.T @ setpoint.wrench + J_held.T @ follow + posture
 
 
 def _chosen(flag: cs.SX, then: SimpleNamespace, other: SimpleNamespace) -> SimpleNamespace:

@@ -47,13 +47,13 @@ class AbstractInnerLoop(abc.ABC):
     def see(
         self,
         y: Measurement,
-        given: cs.SX,
+        applied: cs.SX,
         elapsed: cs.SX,
         s: SimpleNamespace,
         m: SimpleNamespace,
         i: SimpleNamespace,
     ) -> Seen:
-        """Return the measurement to work with; `given` is the torque that the motors were told last."""
+        """Return the measurement to work with; `applied` is the torque that the motors were told last."""
 
     @abc.abstractmethod
     def command(
@@ -82,7 +82,7 @@ class PlainInnerLoop(AbstractInnerLoop):
     def see(
         self,
         y: Measurement,
-        given: cs.SX,
+        applied: cs.SX,
         elapsed: cs.SX,
         s: SimpleNamespace,
         m: SimpleNamespace,

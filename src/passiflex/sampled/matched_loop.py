@@ -97,7 +97,7 @@ class MatchedInnerLoop(AbstractInnerLoop):
     def see(
         self,
         y: Measurement,
-        given: cs.SX,
+        applied: cs.SX,
         elapsed: cs.SX,
         s: SimpleNamespace,
         m: SimpleNamespace,
@@ -106,8 +106,8 @@ class MatchedInnerLoop(AbstractInnerLoop):
         """Return y with q, q̇ and θ̇ estimated."""
         K, D, B = m.joint_stiffness, m.joint_damping, m.motor_inertia
         first = s.seen < 1
-        past = cs.vertcat(s.in_flight[1:, :], given.T)  # the first acted in the period that ends now
-        past = cs.if_else(first, cs.repmat(given.T, self.late + 1, 1), past)
+        past = cs.vertcat(s.in_flight[1:, :], applied.T)  # the first acted in the period that ends now
+        past = cs.if_else(first, cs.repmat(applied.T, self.late + 1, 1), past)
         pull = (past[0, :].T - y.tau_a) / B
         last_theta = cs.if_else(first, y.theta, s.seen_theta)
         rate = (y.theta - last_theta) / elapsed + cs.if_else(first, 0, elapsed / 2 * pull)

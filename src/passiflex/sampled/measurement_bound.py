@@ -14,7 +14,7 @@ claims beyond what is there, is the sum of
 
 The bend of a pair of readings is b = `BEND` (|δΔτ|ᵀ|Δq| + |Δτ|ᵀ|δΔq|), with δ the difference to the step before, less
 what the noise explains: how far torque and way may have left their chords. Which errors there are is declared, by
-`error_layout`. All else is measured, and nothing is known of motors, links or surroundings.
+`error_layout`. All else is measured, and nothing is known of motors, links or environment.
 """
 
 from __future__ import annotations

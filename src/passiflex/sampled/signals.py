@@ -12,7 +12,7 @@ from passiflex.robots.arm import EndEffectorPose
 from passiflex.sampled.tank import TankEntry
 
 
-class Wish(NamedTuple):
+class Setpoint(NamedTuple):
     """What is asked of the controller in one period.
 
     Attributes
@@ -61,7 +61,7 @@ class LedgerEntry(NamedTuple):
     fault: cs.SX
 
 
-class Step(NamedTuple):
+class PeriodResult(NamedTuple):
     """Command, next state (flat) and ledger entry of one period, and the measurement as the law believed it."""
 
     command: Command
@@ -76,7 +76,7 @@ class ControlParameters(NamedTuple):
     Attributes
     ----------
     model: The law's model, `robot.layout`.
-    gains: The law's gains, `law.layout`; stiffness and damping of the period come with the wish.
+    gains: The law's gains, `law.layout`; stiffness and damping of the period come with the setpoint.
     fallback: The same layout, in force once the law has fallen back.
     tank: `AbstractTank.layout`.
     actions: `action_layout`.

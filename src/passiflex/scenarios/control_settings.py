@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import AliasChoices, BeforeValidator, Field, model_validator
 
 from passiflex.scenarios.law_settings import (
     Damping,
@@ -14,14 +14,13 @@ from passiflex.scenarios.law_settings import (
     Stiffness,
     free_mistakes,
 )
+from passiflex.scenarios.spans import Instant, Seconds, TimeSpan
 from passiflex.texts.quantity import Quantity, shown
 from passiflex.texts.section import Mistakes, Section
 
 Vector = tuple[float, ...]
 Found = list[tuple[tuple[str | int, ...], str]]
 """Mistakes, each with its place."""
-Seconds = Annotated[float, Quantity("s", above=0)]
-Instant = Annotated[float, Quantity("s", least=0)]
 Frequency = Annotated[float, Quantity("Hz", above=0, finite=False)]
 Angle = Annotated[float, Quantity("rad", least=0)]
 Share = Annotated[float, Quantity("1", least=0, most=1)]
@@ -80,8 +79,10 @@ class Control(Section):
     fallback: Fallback = Field(
         default=Fallback(), description="the law that takes over when the tank is overdrawn"
     )
-    insist: Annotated[bool, BeforeValidator(_flag)] = Field(
-        default=False, description="run the law even at a rate and delay at which it is unstable"
+    allow_unstable: Annotated[bool, BeforeValidator(_flag)] = Field(
+        default=False,
+        validation_alias=AliasChoices("allow_unstable", "insist"),
+        description="run the law even at a rate and delay at which it is unstable",
     )
 
     @model_validator(mode="after")
@@ -170,20 +171,7 @@ class Actions(Section):
     follow_acceleration: Share = Field(default=0.0, description="share of Λ ẍ_d that is fed forward, 0 to 1")
 
 
-class Interval(Section):
-    """From one instant to another."""
-
-    start: Instant = Field(alias="from", description="when it begins, s")
-    end: Instant = Field(alias="to", description="when it ends, s")
-
-    @model_validator(mode="after")
-    def _ordered(self) -> Self:
-        if not self.end > self.start:
-            raise Mistakes((("to",), f"needs to be later than from = {self.start:g} s; got {self.end:g} s"))
-        return self
-
-
-class Feedforward(Interval):
+class Feedforward(TimeSpan):
     """A wrench that the end effector is to exert for some time, as far as the valve is open."""
 
     force: Annotated[Vector, Quantity("N", ((3,),))] = Field(
@@ -192,13 +180,6 @@ class Feedforward(Interval):
     moment: Annotated[Vector, Quantity("N m", ((3,),))] = Field(
         default=(0.0, 0.0, 0.0), description="moment in world axes, N m"
     )
-
-
-class Drag(Interval):
-    """The end effector moves through something that takes energy out, as in polishing."""
-
-    viscous: Annotated[float, Quantity("N s/m", least=0)] = Field(default=0.0, description="N s/m")
-    dry: Annotated[float, Quantity("N", least=0)] = Field(default=0.0, description="against the motion, N")
 
 
 class GainChange(Section):

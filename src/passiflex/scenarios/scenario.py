@@ -2,37 +2,33 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Self
 
 import yaml
-from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
+from pydantic import AliasChoices, Field, ValidationInfo, field_validator, model_validator
 
 from passiflex.scenarios.control_settings import (
     Actions,
     Control,
-    Drag,
     Feedforward,
     GainChange,
-    Interval,
     MotorSettings,
     SensorSettings,
     change_mistakes,
     gain_mistakes,
 )
+from passiflex.scenarios.environment import Drag, as_drags
 from passiflex.scenarios.law_settings import ImpedanceSettings, RigidSettings
 from passiflex.scenarios.model_errors import Deviations, ModelErrors
 from passiflex.scenarios.noise_settings import Noise
+from passiflex.scenarios.reference import ZERO, Length, ReferenceEvent, Turn
 from passiflex.scenarios.row_interval import fitting_interval, interval_mistake
+from passiflex.scenarios.spans import Seconds, TimeSpan
 from passiflex.scenarios.tank_settings import TankSettings
-from passiflex.texts.quantity import Quantity, shown
+from passiflex.texts.quantity import Quantity
 from passiflex.texts.section import Mistakes, Section
 
 Vector = tuple[float, ...]
-Seconds = Annotated[float, Quantity("s", above=0)]
-Instant = Annotated[float, Quantity("s", least=0)]
-Length = Annotated[Vector, Quantity("m", ((3,),))]
-Turn = Annotated[Vector, Quantity("rad", ((3,),))]
-ZERO = (0.0, 0.0, 0.0)
 
 
 class Tool(Section):
@@ -44,55 +40,7 @@ class Tool(Section):
     rotation_vector: Turn = Field(default=ZERO, description="turn of the end effector's axes, rad")
 
 
-class Step(Section):
-    """The reference jumps."""
-
-    at: Instant = Field(description="when it begins, s")
-    kind: Literal["step"] = Field(description="step, move, circle or hold")
-    by: Length = Field(description="displacement in world axes, m")
-    turn: Turn = Field(default=ZERO, description="rotation vector of the turn in world axes, rad")
-
-
-class Move(Section):
-    """The reference moves with minimum jerk."""
-
-    at: Instant = Field(description="when it begins, s")
-    kind: Literal["move"] = Field(description="step, move, circle or hold")
-    by: Length = Field(description="displacement in world axes, m")
-    duration: Seconds = Field(description="how long the move takes, s")
-
-
-def _axes(written: Any) -> tuple[str, str]:
-    """Return two different axes, as lower-case letters."""
-    axes = [str(a).lower() for a in written] if isinstance(written, list | tuple) else []
-    if len(axes) != 2 or not set(axes) <= set("xyz") or axes[0] == axes[1]:
-        raise ValueError(f"expected two different axes of x, y, z; got {shown(written)}")
-    return axes[0], axes[1]
-
-
-class Circle(Section):
-    """The reference goes round a circle, from where it is and in the direction of the plane's first axis."""
-
-    at: Instant = Field(description="when it begins, s")
-    kind: Literal["circle"] = Field(description="step, move, circle or hold")
-    plane: Annotated[tuple[Literal["x", "y", "z"], Literal["x", "y", "z"]], BeforeValidator(_axes)] = Field(
-        description="list of two world axes, as [y, z]: the direction of the start, and towards the centre"
-    )
-    radius: Annotated[float, Quantity("m", above=0)] = Field(description="radius, m")
-    period: Seconds = Field(description="time of one turn, s")
-
-
-class Hold(Section):
-    """The reference stops."""
-
-    at: Instant = Field(description="when it begins, s")
-    kind: Literal["hold"] = Field(description="step, move, circle or hold")
-
-
-ReferenceEvent = Annotated[Step | Move | Circle | Hold, Field(discriminator="kind")]
-
-
-class Force(Interval):
+class Force(TimeSpan):
     """A constant wrench on the end effector for some time; wrenches that overlap add up."""
 
     force: Annotated[Vector, Quantity("N", ((3,),))] = Field(
@@ -111,7 +59,7 @@ def _own_tank(data: dict[str, Any]) -> TankSettings | None:
 
 QUICK_DUMPER = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
 """That of LibYAML where there is one: a campaign writes down each of its samples."""
-WITH_CONTROL = ("sensors", "motors", "actions", "gains", "feedforward", "drags")
+WITH_CONTROL = ("sensors", "motors", "actions", "gain_changes", "feedforward")
 """Entries of a scenario that only a sampled run has."""
 
 
@@ -156,13 +104,19 @@ class Scenario(Section):
     sensors: SensorSettings | None = Field(default=None, description="sensors, with control only")
     motors: MotorSettings | None = Field(default=None, description="motors, with control only")
     actions: Actions | None = Field(default=None, description="gated actions, with control only")
-    gains: tuple[GainChange, ...] = Field(
-        default=(), description="changes of K_x and D_x in the order of time, with control only"
+    gain_changes: tuple[GainChange, ...] = Field(
+        default=(),
+        validation_alias=AliasChoices("gain_changes", "gains"),
+        description="changes of K_x and D_x in the order of time, with control only",
     )
     feedforward: tuple[Feedforward, ...] = Field(
         default=(), description="wrenches that the end effector is to exert, with control only"
     )
-    drags: tuple[Drag, ...] = Field(default=(), description="drags at the end effector, with control only")
+    environment: tuple[Drag, ...] = Field(
+        default=(),
+        validation_alias=AliasChoices("environment", "drags"),
+        description="what touches the end effector",
+    )
     output_interval: Seconds = Field(
         default_factory=fitting_interval,
         validate_default=True,
@@ -173,6 +127,18 @@ class Scenario(Section):
         default=1e-9, description="relative tolerance of the integrator"
     )
     seed: int = Field(default=0, ge=0, strict=True, description="seed of the noise")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _drags_with_their_kind(cls, written: Any) -> Any:
+        if not isinstance(written, dict):
+            return written
+        return {name: cls.from_former(name, value) for name, value in written.items()}
+
+    @classmethod
+    def from_former(cls, name: str, written: Any) -> Any:
+        """Return what was written for an entry by its former name as the entry takes it by its new one."""
+        return as_drags(written) if name == "drags" else written
 
     @field_validator("tank")
     @classmethod
@@ -224,7 +190,7 @@ class Scenario(Section):
             raise ValueError("needs `control`: only a sampled run has it")
         return entry
 
-    @field_validator("gains")
+    @field_validator("gain_changes")
     @classmethod
     def _gains_of_the_task(
         cls, changes: tuple[GainChange, ...], info: ValidationInfo
@@ -263,7 +229,7 @@ class Scenario(Section):
             raise Mistakes(*found)
         return events
 
-    @field_validator("forces", "gains", "feedforward", "drags")
+    @field_validator("forces", "gain_changes", "feedforward", "environment")
     @classmethod
     def _within_the_run(cls, entries: tuple[Any, ...], info: ValidationInfo) -> tuple[Any, ...]:
         end = info.data.get("duration", float("inf"))

@@ -19,8 +19,8 @@ from passiflex.loops.witness import Noted
 from passiflex.native import Change, LaneFunctions, LaneInputs, LaneLoop, find_compiler
 from passiflex.problems.problem import Problem
 from passiflex.problems.unbooked import unbooked
-from passiflex.runs.run import Rows, Run, assemble
-from passiflex.simulation.rows import Chance, Told, orders
+from passiflex.runs.run import Recorded, Run, assemble
+from passiflex.simulation.schedule import Chance, Scheduled, schedule
 from passiflex.simulation.simulate_sampled import (
     left_finite,
     longest_step,
@@ -33,7 +33,7 @@ from passiflex.stability.noise_credit import charged
 Array = NDArray[np.float64]
 T = TypeVar("T")
 
-PIECE = 2048
+CHUNK = 2048
 """Periods that are made ready at a time."""
 
 _lane_loops: dict[tuple[Hashable, int | None], LaneLoop] = {}
@@ -183,13 +183,13 @@ def _advance(
         [p_control, np.stack([witness.numbers(p.law.robot, p.tank.initial) for p in filled], axis=1)]
     )
     state = lanes.start([start(p, compiled) for p in filled])
-    told = [orders(p, compiled.loop.period) for p in filled]
+    told = [schedule(p, compiled.loop.period) for p in filled]
     chances = [Chance(p, compiled.loop.period) for p in filled]
-    samples, piece = sample_count(problems[0]), max(1, PIECE // every) * every
+    samples, chunk = sample_count(problems[0]), max(1, CHUNK // every) * every
     ended, whole = np.full(lanes.width, samples), np.zeros(lanes.width, dtype=np.int64)
     values = np.full((len(problems), -(-samples // every), columns.size), np.nan)
-    for first in range(0, samples, piece):
-        count = min(piece, samples - first)
+    for first in range(0, samples, chunk):
+        count = min(chunk, samples - first)
         drawn, timing = zip(*(chance.take(first, count) for chance in chances), strict=True)
         inputs = LaneInputs(
             first, _changes(told, first, first + count), np.stack(drawn, axis=-1), np.stack(timing, axis=-1)
@@ -228,12 +228,12 @@ def _advance(
     ]
 
 
-def _changes(told: list[list[Told]], begin: int, end: int) -> list[Change]:
+def _changes(told: list[list[Scheduled]], begin: int, end: int) -> list[Change]:
     return [
-        Change(order.first, lane, order.numbers)
+        Change(scheduled.first, lane, scheduled.numbers)
         for lane, list_of in enumerate(told)
-        for order in list_of
-        if begin <= order.first < end
+        for scheduled in list_of
+        if begin <= scheduled.first < end
     ]
 
 
@@ -289,7 +289,7 @@ def simulate_in_lane(problem: Problem) -> Run:
     layouts = [layout.kept for layout in sample_parts(loop).values()]
     (recording,) = simulate_batch([problem], [f.name for layout in layouts for f in layout])
     rows = [
-        Rows(layout, np.hstack([recording[f.name].reshape(len(recording.time), f.size) for f in layout]))
+        Recorded(layout, np.hstack([recording[f.name].reshape(len(recording.time), f.size) for f in layout]))
         for layout in layouts
     ]
     noted = Noted(loop.witness.extremes, recording.noted)

@@ -12,9 +12,8 @@ from passiflex.loops.witness import Noted
 from passiflex.native import LoopState, NativeFunction, fastest_pole
 from passiflex.native.stability import STABILITY_LIMIT
 from passiflex.problems.problem import Problem
-from passiflex.runs.run import Rows, Run, assemble
-from passiflex.simulation.rows import NOW
-from passiflex.simulation.rows import Rows as PeriodRows
+from passiflex.runs.run import Recorded, Run, assemble
+from passiflex.simulation.schedule import NOW, PeriodRows
 from passiflex.stability.admissible import require_stable
 from passiflex.stability.loop_at_rest import at_rest, standing
 from passiflex.stability.noise_credit import charged
@@ -23,7 +22,7 @@ Array = NDArray[np.float64]
 
 RESOLVED = 0.35
 """Share of Runge-Kutta's stability limit that a step uses: energies of Fig. 1 then close to 1e-8 J."""
-PIECE = 8192
+CHUNK = 8192
 """Periods that are made ready at a time; it bounds the memory, whatever the length of a run."""
 MOST_STEPS = 200_000_000
 """Steps of one run at most, about two minutes."""
@@ -37,7 +36,7 @@ def simulate_sampled(problem: Problem) -> Run:
     Raises
     ------
     UnstableLoopError
-        If the loop is unstable at its rate and delay, and the scenario does not insist.
+        If the loop is unstable at its rate and delay, and the scenario does not allow_unstable.
     """
     require_stable(problem)
     return simulate_unchecked(problem)
@@ -99,13 +98,13 @@ def _record(problem: Problem, compiled: CompiledSampledLoop) -> Run:
     longest = longest_step(problem, compiled.plant)
     every = round(problem.output_interval / s.period)
     rows = PeriodRows(problem, loop.period, compiled.row)
-    pieces: list[list[Array]] = []
+    chunks: list[list[Array]] = []
     samples, failure = sample_count(problem), ""
     witness = loop.witness
     p_watch = np.concatenate([s.numbers, witness.numbers(problem.law.robot, problem.tank.initial)])
-    piece = max(1, PIECE // every) * every
-    for first in range(0, samples, piece):
-        count = min(piece, samples - first)
+    chunk = max(1, CHUNK // every) * every
+    for first in range(0, samples, chunk):
+        count = min(chunk, samples - first)
         told, timing = rows.take(first, count)
         done = held.advance(
             state,
@@ -123,11 +122,11 @@ def _record(problem: Problem, compiled: CompiledSampledLoop) -> Run:
         state = done.state
         good = done.completed // every + 1 if done.completed < count else None
         parts = (done.x, done.quads, done.controller, done.command, done.signals, told[::every])
-        pieces.append([part[:good] for part in parts])
+        chunks.append([part[:good] for part in parts])
         if done.completed < count:
             failure = left_finite((first + done.completed) * s.period)
             break
-    seen = [np.vstack(part) for part in zip(*pieces, strict=True)]
+    seen = [np.vstack(part) for part in zip(*chunks, strict=True)]
     return _assemble(problem, compiled, seen, failure, witness.noted(state.watched))
 
 
@@ -137,13 +136,13 @@ def _assemble(
     s, parts = problem.sampling, sample_parts(compiled.loop)
     assert s is not None
     x, _, _, command, _, rows = seen
-    felt = slice(0, compiled.loop.plant.surroundings.size)
+    felt = slice(0, compiled.loop.plant.environment.size)
     truth = np.asarray(compiled.outputs.map(x, command, rows[:, felt], s.numbers), dtype=float)
     everything = [*seen[:-1], truth, rows]
     count = _whole_rows(everything) if failure else len(x)
     recorded = []
     for layout, numbers in zip(parts.values(), everything, strict=True):
-        recorded.append(Rows(layout.kept, numbers[:count, layout.columns(lambda f: f.kept)]))
+        recorded.append(Recorded(layout.kept, numbers[:count, layout.columns(lambda f: f.kept)]))
     every = round(problem.output_interval / s.period)
     time: Array = np.arange(count, dtype=np.float64) * (s.period * every)
     return assemble(problem, time, recorded, [], failure, noted)

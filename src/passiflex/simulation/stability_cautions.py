@@ -15,9 +15,9 @@ def stability_cautions(problem: Problem) -> tuple[str, ...]:
     mode = loop.spectrum(delay=loop.s.delay + loop.s.jitter)
     if mode.undamped or mode.drift > SEEN:
         lines.append(drift_words(mode) + "; null_space_damping or actions.posture_stiffness ends it")
-    if loop.s.insist and not mode.stable:
+    if loop.s.allow_unstable and not mode.stable:
         lines.append(
-            f"the law is insisted on and does not hold: joint {mode.joint}, {mode.frequency:.0f} Hz, "
+            f"the law is allowed though it does not hold: joint {mode.joint}, {mode.frequency:.0f} Hz, "
             f"{mode.radius:.4g} per period; whatever the tank says, it trembles until it falls back"
         )
     return tuple(lines)

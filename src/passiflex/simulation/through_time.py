@@ -7,15 +7,15 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from passiflex.control.motion import MOTION, Motion, Pose, between, hold, pose_at, shifted
 from passiflex.control.tank import jump_cost
 from passiflex.errors import SimulationError
 from passiflex.loops.closed_loop import ENERGIES
 from passiflex.loops.compiled import CompiledLoop, compiled_loop
-from passiflex.loops.motion import MOTION, Motion, Pose, between, hold, pose_at, shifted
 from passiflex.native import Watched, fastest_pole
 from passiflex.native.stability import STABILITY_LIMIT
 from passiflex.problems.problem import Event, Problem
-from passiflex.runs.run import Rows, Run, assemble
+from passiflex.runs.run import Recorded, Run, assemble
 from passiflex.simulation.integrate import (
     CHECK,
     RESOLVED,
@@ -144,9 +144,9 @@ class _Simulation:
         )
         loop = self.compiled.loop
         recorded = [
-            Rows(loop.state, states),
-            Rows(ENERGIES, energies, "_energy"),
-            Rows(loop.output_layout, outputs),
+            Recorded(loop.state, states),
+            Recorded(ENERGIES, energies, "_energy"),
+            Recorded(loop.output_layout, outputs),
         ]
         noted = loop.witness.noted(self.watched.memory)
         return assemble(problem, record.time[:good], recorded, self.log, failure, noted)

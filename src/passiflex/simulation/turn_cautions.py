@@ -13,9 +13,9 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
+from passiflex.control.motion import Motion, Pose, between, hold, pose_at
 from passiflex.control.task import PoseTask
 from passiflex.control.turning import held_angle, largest_moment, turning_moment
-from passiflex.loops.motion import Motion, Pose, between, hold, pose_at
 from passiflex.problems.problem import Problem
 
 Array = NDArray[np.float64]

@@ -150,8 +150,8 @@ def require_stable(problem: Problem) -> None:
         With cause, number and remedies that were tried.
     """
     assert problem.sampling is not None
-    insist = problem.sampling.insist
-    found = judged_fallback(problem) if insist else judge(problem)
+    allow_unstable = problem.sampling.allow_unstable
+    found = judged_fallback(problem) if allow_unstable else judge(problem)
     if found is None or found.stable:
         return
     what = {
@@ -160,9 +160,8 @@ def require_stable(problem: Problem) -> None:
         "fallback": f"the fallback of {problem.name!r} does not hold, and could not stop the arm",
     }[found.part]
     advice = advise(problem, found)
-    insisting = (
-        "" if insist or found.part == "fallback" else "; or control.insist: true, to run it all the same"
-    )
+    all_the_same = allow_unstable or found.part == "fallback"
+    insisting = "" if all_the_same else "; or control.allow_unstable: true, to run it all the same"
     raise UnstableLoopError(what, cause=advice.cause, number=advice.number, remedy=advice.remedy + insisting)
 
 

@@ -224,7 +224,7 @@ class LinearLoop:
         rows = np.vstack(points)
         numbers = np.repeat([self._smooth(at) for at in others], len(points[0]), axis=0)
         u = np.hstack(
-            [rows[:, self.x.size :], np.zeros((len(rows), self.compiled.loop.plant.surroundings.size))]
+            [rows[:, self.x.size :], np.zeros((len(rows), self.compiled.loop.plant.environment.size))]
         )
         values = self.compiled.plant.map(rows[:, : self.x.size], u, numbers)[0]
         split = values.reshape(len(others), 2, len(steps[0]), -1)

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from passiflex.loops.motion import Pose
+from passiflex.control.motion import Pose
 from passiflex.loops.plant import Plant
 from passiflex.loops.sampled_loop import SampledLoop
 from passiflex.problems.posture import Posture, posture

@@ -229,7 +229,7 @@ def _jitter(t: Trial) -> Iterator[Remedy]:
 
 def _as_the_law(t: Trial) -> Iterator[Remedy]:
     """Yield a fallback that is shaped as the law is, which holds if that law does."""
-    if t.found.part != "fallback" or not t.shapes or t.loop.s.insist:
+    if t.found.part != "fallback" or not t.shapes or t.loop.s.allow_unstable:
         return
     own = t.problem.law.layout.unpack(t.problem.gains)
     shaping = {name: own[name].tolist() for name in ("shaped_stiffness", "shaped_inertia")}
@@ -270,7 +270,7 @@ def _tried(problem: Problem, remedy: Remedy) -> bool:
         if not np.array_equal(changed.plant, problem.plant):
             changed = altered(changed, plant=problem.law.robot.layout.unpack(problem.plant))
         if (
-            changed.sampling is not None and changed.sampling.insist
+            changed.sampling is not None and changed.sampling.allow_unstable
         ):  # then it is the fallback that has to hold
             alone = judged_fallback(changed)
             return alone is None or alone.stable

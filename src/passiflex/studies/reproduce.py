@@ -11,23 +11,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from passiflex.diagrams import Viewed
 from passiflex.errors import NameUnknownError
 from passiflex.files import require_writable, whole_file
 from passiflex.origin import package_version, source_commit
 from passiflex.passivity import claimed_balance
-from passiflex.plotting.figures import CircleColumn, Curve, StepColumn, draw_circle, draw_steps, save_figure
+from passiflex.plotting.figures import CircleColumn, Series, StepColumn, draw_circle, draw_steps, save_figure
 from passiflex.reports import write_report
 from passiflex.reports.viewer import read_viewer
 from passiflex.responses.steps import displacement
 from passiflex.robots import FlexibleJointRobot
 from passiflex.scenarios.law_settings import ImpedanceSettings
-from passiflex.scenarios.scenario import Circle, Step
 from passiflex.simulation import Scenario
 from passiflex.studies.paper import FIGURES, Case, Report, figure_cases
 from passiflex.studies.sampled import reproduce_sampled
 from passiflex.studies.summary import summarise
 from passiflex.studies.uncertainty import reproduce_uncertainty
-from passiflex.views import Viewed
 
 STUDIES = {"sampled": reproduce_sampled, "uncertainty": reproduce_uncertainty}
 """Studies beyond the paper's figures."""
@@ -103,13 +102,7 @@ def conditions(scenario: Scenario) -> str:
 
 def _task(scenario: Scenario) -> str:
     """Return what reference and forces do, in words."""
-    words = []
-    for e in scenario.reference:
-        if isinstance(e, Step):
-            words.append(f"step of x_d by {list(e.by)} m at {e.at:g} s")
-        elif isinstance(e, Circle):
-            plane = "-".join(e.plane)
-            words.append(f"circle in {plane} from {e.at:g} s: radius {e.radius:g} m, period {e.period:g} s")
+    words = [said for e in scenario.reference if (said := e.in_full())]
     words += [f"force {list(f.force)} N from {f.start:g} s to {f.end:g} s" for f in scenario.forces]
     errors = {k.replace("_", " "): v for k, v in scenario.model_errors.model_dump().items() if v}
     if errors:
@@ -140,8 +133,8 @@ def _title(case: Case) -> str:
 
 
 def _step_column(case: Case) -> StepColumn:
-    curves = {name: Curve(run.time, displacement(run["position"])) for name, run in case.runs.items()}
-    curves |= {name: Curve(r.time, r.displacement) for name, r in case.msd.items()}
+    curves = {name: Series(run.time, displacement(run["position"])) for name, run in case.runs.items()}
+    curves |= {name: Series(r.time, r.displacement) for name, r in case.msd.items()}
     return StepColumn(_title(case), curves)
 
 

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from passiflex.diagrams import Viewed
 from passiflex.files import require_writable
 from passiflex.passivity import Audit, audit, port_tank
 from passiflex.plotting.figures import save_figure
@@ -19,18 +20,18 @@ from passiflex.reports import write_report
 from passiflex.responses.metrics import rms
 from passiflex.responses.msd import IdealResponse
 from passiflex.responses.steps import displacement, step_window
-from passiflex.scenarios.control_settings import Drag, MotorSettings
+from passiflex.scenarios.control_settings import MotorSettings
+from passiflex.scenarios.environment import Drag
 from passiflex.scenarios.law_settings import ImpedanceSettings
-from passiflex.scenarios.scenario import Circle
+from passiflex.scenarios.reference import Circle
 from passiflex.scenarios.tank_settings import TankSettings
 from passiflex.simulation import Problem, Run, Scenario, resolve, simulate_problem
 from passiflex.studies.external_torque import external_torque_table
 from passiflex.studies.paper import Report, ideals, shipped_scenario
 from passiflex.studies.summary import SETTLED_CIRCLE, plain, response_numbers
-from passiflex.views import Viewed
 
 TASKS = ("fig1", "fig2")
-DRAG = Drag.model_validate({"from": 0.0, "to": 1.0, "viscous": 5.0, "dry": 2.0})
+DRAG = Drag.model_validate({"kind": "drag", "from": 0.0, "to": 1.0, "viscous": 5.0, "dry": 2.0})
 """What a polishing end effector feels; its times are set by the task."""
 SAVED = 5
 """One of so many rows is written to the file of a run that reached its end."""
@@ -52,7 +53,9 @@ def _paper_gains(scenario: Scenario, tank: str, motors: MotorSettings) -> Scenar
     printed = shipped_scenario(scenario.name.removesuffix("_sampled")).law
     assert isinstance(printed, ImpedanceSettings)
     assert scenario.control is not None
-    control = _changed_section(scenario.control, inner_loop="plain", external_torque="measured", insist=True)
+    control = _changed_section(
+        scenario.control, inner_loop="plain", external_torque="measured", allow_unstable=True
+    )
     tank_settings = TankSettings.model_validate({"kind": tank, "initial": 2.0}).completed("port")
     return _changed(scenario, law=printed, control=control, tank=tank_settings, motors=motors)
 
@@ -65,7 +68,7 @@ def _with_drag(scenario: Scenario) -> Scenario:
     """Return the scenario with a drag from the middle of the circle's first turns to the end."""
     start = next((e.at for e in scenario.reference if isinstance(e, Circle)), 0.0)
     drag = _changed_section(DRAG, start=start, end=scenario.duration)
-    return _changed(scenario, drags=(drag,))
+    return _changed(scenario, environment=(drag,))
 
 
 LIMITED = MotorSettings(torque_limit="robot")

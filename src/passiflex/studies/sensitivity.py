@@ -19,7 +19,7 @@ from passiflex.responses.metrics import largest_rise
 from passiflex.responses.msd import ideal_response
 from passiflex.responses.steps import displacement, step_numbers, step_window
 from passiflex.robots import FlexibleJointRobot
-from passiflex.scenarios.scenario import Circle
+from passiflex.scenarios.reference import Circle
 from passiflex.simulation import Scenario, resolve, simulate_problem
 from passiflex.studies.paper import TARGET_RATIO, Report, shipped_scenario, with_baseline
 

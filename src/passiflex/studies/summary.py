@@ -12,7 +12,7 @@ from passiflex.passivity import audit, claimed_balance
 from passiflex.responses.metrics import largest_rise, rms
 from passiflex.responses.msd import IdealResponse
 from passiflex.responses.steps import StepWindow, displacement, step_numbers, step_window
-from passiflex.scenarios.scenario import Circle
+from passiflex.scenarios.reference import Circle
 from passiflex.simulation import Run
 from passiflex.studies.paper import Case
 

@@ -15,9 +15,9 @@ from passiflex.campaigns.evaluate import run_sample
 from passiflex.campaigns.intervals import Share, share_of
 from passiflex.campaigns.page import Page, ideal_along, page
 from passiflex.campaigns.statistics import Statistics, numbers_of, statistics
+from passiflex.chunks.run_chunks import Progress, sparsely
 from passiflex.files import require_writable
-from passiflex.pieces.run_pieces import Progress, sparsely
-from passiflex.plotting.figures import Curve, save_figure
+from passiflex.plotting.figures import Series, save_figure
 from passiflex.plotting.uncertainty import UncertainColumn, draw_uncertainty
 from passiflex.reports import write_report
 from passiflex.responses.steps import step_window
@@ -190,7 +190,7 @@ def _column(campaign: Campaign, drawn: Page, at_limit: Share) -> UncertainColumn
         end=window.end,
         shares=(*(s for s in drawn.shares if s.name in ("passive", "settled", "fell_back")), at_limit),
         band=drawn.band,
-        ideal=Curve(*ideal),
+        ideal=Series(*ideal),
         overshoot=by_metric["overshoot"],
         margin=by_metric["margin"],
     )

@@ -9,7 +9,7 @@ from typing import Any, TypeVar, get_args
 from pydantic import BaseModel, ValidationError
 
 from passiflex.errors import ScenarioError
-from passiflex.texts.model_mistakes import fields, models, tag_field, told
+from passiflex.texts.model_mistakes import fields, former_names, models, tag_field, told
 from passiflex.texts.section import Section
 from passiflex.texts.yaml_tree import dotted
 
@@ -52,13 +52,13 @@ def replaced(section: S, entries: Mapping[str, Any]) -> S:
     ScenarioError
         As `changed`.
     """
-    names = {name: field.alias or name for name, field in type(section).model_fields.items()}
+    names = _names(type(section))
     data = {names[name]: getattr(section, name) for name in section.model_fields_set}
     for name, value in entries.items():
         if "." in name or "[" in name:
             what = f"{name}: model_copy takes whole entries"
             raise _refused(section, [f"{what}; try changed({{{name!r}: …}})"])
-        data[names.get(name, name)] = value
+        data[names.get(name, name)] = _as_now(type(section), name, value)
     return _validated(section, data)
 
 
@@ -107,13 +107,22 @@ def _merged(here: tuple[Model, ...], old: Any, new: Any, place: tuple[str | int,
     if tag is not None and tag in new and new[tag] != old.get(tag):
         return dict(new)
     known = fields(model)
-    names = {name: field.alias or name for name, field in model.model_fields.items()}
-    named = {names.get(str(name), str(name)): value for name, value in new.items()}
+    names = _names(model)
+    named = {names.get(str(name), str(name)): _as_now(model, str(name), value) for name, value in new.items()}
     kept = {name: value for name, value in old.items() if name not in _other_ways(model, named)}
     for name, value in named.items():
         below = tuple(models(known[name].annotation)) if name in known else ()
         kept[name] = _merged(below, kept.get(name), value, (*place, name), out)
     return kept
+
+
+def _names(model: Model) -> dict[str, str]:
+    """Return the name in a file of each field, and of each former name."""
+    return {n: f.alias or n for n, f in model.model_fields.items()} | former_names(model)
+
+
+def _as_now(model: Model, name: str, value: Any) -> Any:
+    return model.from_former(name, value) if issubclass(model, Section) else value
 
 
 def _chosen(here: tuple[Model, ...], old: Any) -> Model | None:

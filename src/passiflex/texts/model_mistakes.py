@@ -12,7 +12,7 @@ from pydantic.fields import FieldInfo
 
 from passiflex.errors import nearest
 from passiflex.texts.quantity import shown
-from passiflex.texts.section import Mistakes
+from passiflex.texts.section import Mistakes, Section
 from passiflex.texts.yaml_tree import Place, dotted
 
 REFUSED_NAME = "refused_name"
@@ -54,7 +54,9 @@ def explained(error: ValidationError, data: Any, root: Model) -> Iterator[tuple[
             yield place, e["msg"], True
         elif kind == "extra_forbidden":
             hint = f"; {suggested(str(place[-1]), names)}" if e["loc"] in hinted else ""
-            yield place, f"unknown name{hint}", True
+            now = {k: n for m in _reached(e["loc"][:-1], root) for k, n in former_names(m).items()}
+            twice = f"is {now[place[-1]]!r}, which is there too; remove one" if place[-1] in now else ""
+            yield place, twice or f"unknown name{hint}", True
         elif kind == "missing":
             yield place, f"missing: {names[str(e['loc'][-1])]}", True
         elif kind.startswith("union_tag") and not isinstance(e["input"], dict):
@@ -106,6 +108,17 @@ def fields(model: Model) -> dict[str, FieldInfo]:
     return {f.alias or name: f for name, f in model.model_fields.items()}
 
 
+def readable(model: Model) -> dict[str, FieldInfo]:
+    """Return the same, and those that had another name before by that one too."""
+    named = fields(model)
+    return named | {former: named[name] for former, name in former_names(model).items()}
+
+
+def former_names(model: Model) -> dict[str, str]:
+    """Return former name → name of the entries of a model that had another."""
+    return model.former_names() if issubclass(model, Section) else {}
+
+
 def models(annotation: Any) -> Iterator[Model]:
     """Yield the models that an annotation mentions."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
@@ -144,7 +157,7 @@ def _steps(loc: Place, root: Model) -> Iterator[tuple[bool, _Reached]]:
         elif not in_file:
             here = _Reached(tuple(m for m in here.models if part == _tag(m)))
         else:
-            field = {k: f for m in here.models for k, f in fields(m).items()}.get(str(part))
+            field = {k: f for m in here.models for k, f in readable(m).items()}.get(str(part))
             annotation = field.annotation if field else None
             here = _Reached(tuple(models(annotation)), typing.get_origin(annotation) in (tuple, dict))
         yield in_file, here

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, ClassVar, NoReturn, Self
 
-from pydantic import BaseModel, ConfigDict, model_validator
+from pydantic import AliasChoices, BaseModel, ConfigDict, model_validator
 
 from passiflex.errors import ArgumentError, FrozenError
 
@@ -34,8 +34,23 @@ class Section(BaseModel):
     def _without_empty_entries(cls, written: Any) -> Any:
         if not isinstance(written, dict):
             return written
-        known = {f.alias or name for name, f in cls.model_fields.items()}
+        known = {f.alias or name for name, f in cls.model_fields.items()} | set(cls.former_names())
         return {k: v for k, v in written.items() if v is not None or k not in known}
+
+    @classmethod
+    def former_names(cls) -> dict[str, str]:
+        """Return former name → name of the entries that once had another, and are still read by it."""
+        return {
+            str(former): name
+            for name, field in cls.model_fields.items()
+            if isinstance(field.validation_alias, AliasChoices)
+            for former in field.validation_alias.choices[1:]
+        }
+
+    @classmethod
+    def from_former(cls, name: str, written: Any) -> Any:
+        """Return what was written for an entry by its former name as the entry takes it by its new one."""
+        return written
 
     def changed(self, entries: Mapping[str, Any] = NOTHING, /, **more: Any) -> Self:
         """Return a copy with other entries, validated as those of a file.

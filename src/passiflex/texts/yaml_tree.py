@@ -32,7 +32,7 @@ _SURROGATE = re.compile("[\ud800-\udfff]")
 _STANDARD_TAGS = {f"tag:yaml.org,2002:{kind}" for kind in ("str", "seq", "map")}
 
 
-class Mark(NamedTuple):
+class LineColumn(NamedTuple):
     """A place in a file, counted from 1."""
 
     line: int
@@ -74,10 +74,10 @@ class Tree:
     """
 
     def __init__(self) -> None:
-        self.keys: dict[Place, Mark] = {}
-        self.values: dict[Place, Mark] = {}
+        self.keys: dict[Place, LineColumn] = {}
+        self.values: dict[Place, LineColumn] = {}
         self.spans: dict[Place, slice] = {}
-        self.mistakes: list[tuple[Mark, str, str]] = []
+        self.mistakes: list[tuple[LineColumn, str, str]] = []
 
     def read(self, text: str, needs: str) -> dict[str, Any]:
         """Return the mapping of the text; raise RefusedText where there is none, which says what one needs."""
@@ -90,12 +90,14 @@ class Tree:
             raise
         return mapping
 
-    def report(self, place: Place, message: str, *, at_key: bool = False, mark: Mark | None = None) -> None:
+    def report(
+        self, place: Place, message: str, *, at_key: bool = False, mark: LineColumn | None = None
+    ) -> None:
         """Add a mistake at a key or value, or at the nearest thing around it that the file has."""
         for end in range(len(place), -1, -1):
             known = (self.keys if at_key and end == len(place) else self.values).get(place[:end])
             mark = mark or known
-        self.mistakes.append((mark or Mark(1, 1), f", {dotted(place)}" if place else "", message))
+        self.mistakes.append((mark or LineColumn(1, 1), f", {dotted(place)}" if place else "", message))
 
     def lines(self) -> list[str]:
         """Return the mistakes, one line each, in the order of the file; of very many the first ones."""
@@ -178,8 +180,8 @@ def _one_line(text: str) -> str:
     return "".join(c if c.isprintable() else " " for c in text)[:200]
 
 
-def _mark(node: yaml.Node) -> Mark:
-    return Mark(node.start_mark.line + 1, node.start_mark.column + 1)
+def _mark(node: yaml.Node) -> LineColumn:
+    return LineColumn(node.start_mark.line + 1, node.start_mark.column + 1)
 
 
 def _scalar(text: str) -> Any:

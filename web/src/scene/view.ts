@@ -107,7 +107,7 @@ export class SceneView {
   #viewButtons(): HTMLElement {
     return el(
       "div",
-      { class: "views" },
+      { class: "diagrams" },
       button("whole arm", "look at the whole arm (1)", () => this.whole()),
       button("close-up", "look at the end effector from near by (2)", () => this.closeUp()),
       this.#followButton,

@@ -1,0 +1,136 @@
+"""Reference motions: one primitive with run-time coefficients, so that no motion needs a new build.
+
+    p_d(s) = Σₖ cₖ sᵏ + a sin ωs + b (1 − cos ωs),   R_d(s) = exp([u] ρ s) R₀
+
+covers a set-point, a ramp, a minimum-jerk move, a circle, a sinusoid and a steady rotation. s is the
+reference's own clock: it runs with the time, and slower when the tank is near its floor.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import SimpleNamespace
+from typing import NamedTuple
+
+import casadi as cs
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.spatial.transform import Rotation
+
+from passiflex.control.signals import Reference
+from passiflex.layout import Field, Layout
+from passiflex.robots.arm import EndEffectorPose
+
+DEGREE = 5
+MOTION = Layout(
+    (
+        Field("polynomial", (3, DEGREE + 1), "m/s^k", "c_k, column k multiplies s^k"),
+        Field("horizon", (), "s", "from here on the polynomial keeps its value"),
+        Field("sine", (3,), "m", "a"),
+        Field("cosine", (3,), "m", "b"),
+        Field("frequency", (), "rad/s", "ω"),
+        Field("rotation", (3, 3), "1", "R₀"),
+        Field("rotation_axis", (3,), "1", "u, of unit length"),
+        Field("rotation_rate", (), "rad/s", "ρ"),
+    )
+)
+
+ENDLESS = 1e9
+"""Horizon [s] of a motion that never ends."""
+
+Motion = Mapping[str, NDArray[np.float64]]
+
+
+class Pose(NamedTuple):
+    """A pose in numbers: position (3,) m, rotation matrix (3, 3)."""
+
+    position: NDArray[np.float64]
+    rotation: NDArray[np.float64]
+
+
+def reference_at(clock: cs.SX, rate: cs.SX, c: SimpleNamespace) -> Reference:
+    """Return the reference at the clock s, which runs at `rate` = ṡ, for a view c of `MOTION`."""
+    s, moving = cs.fmin(clock, c.horizon), clock < c.horizon
+    powers = cs.vertcat(*(s**k for k in range(DEGREE + 1)))
+    slopes = moving * cs.vertcat(0, *(k * s ** (k - 1) for k in range(1, DEGREE + 1)))
+    w = c.frequency
+    sin, cos = cs.sin(w * clock), cs.cos(w * clock)
+    position = c.polynomial @ powers + c.sine * sin + c.cosine * (1 - cos)
+    velocity = c.polynomial @ slopes + w * (c.sine * cos + c.cosine * sin)
+    axis = cs.skew(c.rotation_axis)
+    angle = c.rotation_rate * clock
+    turn = cs.SX.eye(3) + cs.sin(angle) * axis + (1 - cs.cos(angle)) * (axis @ axis)
+    twist = cs.vertcat(velocity, c.rotation_rate * c.rotation_axis)
+    return Reference(EndEffectorPose(position, turn @ c.rotation), twist * rate)
+
+
+def hold(pose: Pose) -> dict[str, NDArray[np.float64]]:
+    """Return the motion that stays at `pose`."""
+    polynomial = np.zeros((3, DEGREE + 1))
+    polynomial[:, 0] = pose.position
+    return {
+        "polynomial": polynomial,
+        "horizon": np.asarray(ENDLESS),
+        "sine": np.zeros(3),
+        "cosine": np.zeros(3),
+        "frequency": np.zeros(()),
+        "rotation": np.asarray(pose.rotation, dtype=float),
+        "rotation_axis": np.array([0.0, 0.0, 1.0]),
+        "rotation_rate": np.zeros(()),
+    }
+
+
+def minimum_jerk(pose: Pose, by: ArrayLike, duration: float) -> dict[str, NDArray[np.float64]]:
+    """Return the move by `by` (3,) m within `duration` s, at rest with zero acceleration at both ends."""
+    motion = hold(pose)
+    shape = np.array([0, 0, 0, 10, -15, 6]) / duration ** np.arange(DEGREE + 1)
+    motion["horizon"] = np.asarray(duration)
+    motion["polynomial"] = motion["polynomial"] + np.asarray(by, dtype=float)[:, None] * shape
+    return motion
+
+
+def circle(
+    pose: Pose, first: ArrayLike, second: ArrayLike, radius: float, period: float
+) -> dict[str, NDArray[np.float64]]:
+    """Return c + R (first · sin ωs + second · (1 − cos ωs)), starting at c = pose, ω = 2π / period."""
+    motion = hold(pose)
+    motion["sine"], motion["cosine"] = radius * np.asarray(first), radius * np.asarray(second)
+    motion["frequency"] = np.asarray(2 * np.pi / period)
+    return motion
+
+
+def pose_at(motion: Motion, clock: float) -> Pose:
+    """Return the pose of a motion at the clock s, in numbers."""
+    powers = min(clock, float(motion["horizon"])) ** np.arange(DEGREE + 1)
+    w = float(motion["frequency"])
+    position = (
+        motion["polynomial"] @ powers
+        + motion["sine"] * np.sin(w * clock)
+        + motion["cosine"] * (1 - np.cos(w * clock))
+    )
+    turn = Rotation.from_rotvec(motion["rotation_axis"] * float(motion["rotation_rate"]) * clock)
+    return Pose(position, turn.as_matrix() @ motion["rotation"])
+
+
+def shifted(motion: Motion, start: Pose) -> dict[str, NDArray[np.float64]]:
+    """Return the same motion, moved so that it begins at `start`."""
+    begin = pose_at(motion, 0.0)
+    moved = {k: np.array(v) for k, v in motion.items()}
+    moved["polynomial"][:, 0] += start.position - begin.position
+    moved["rotation"] = start.rotation
+    return moved
+
+
+def moved(pose: Pose, by: ArrayLike, turn: ArrayLike) -> Pose:
+    """Return a pose displaced by `by` (3,) m and turned by a rotation vector (3,) rad, both in world axes."""
+    turned = Rotation.from_rotvec(np.asarray(turn, dtype=float)).as_matrix() @ pose.rotation
+    return Pose(pose.position + np.asarray(by, dtype=float), turned)
+
+
+def between(start: Pose, end: Pose, share: float) -> Pose:
+    """Return the pose at `share` (0..1) of the straight line and the shortest turn from start to end."""
+    turn = Rotation.from_matrix(end.rotation @ start.rotation.T).as_rotvec()
+    return Pose(
+        start.position + share * (end.position - start.position),
+        Rotation.from_rotvec(share * turn).as_matrix() @ start.rotation,
+    )

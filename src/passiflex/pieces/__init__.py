@@ -1,1 +1,0 @@
-"""Work in pieces: computed by any engine, kept in a folder that survives whatever interrupts it."""
