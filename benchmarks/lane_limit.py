@@ -41,7 +41,7 @@ class Period(NamedTuple):
 
 def period_of(problem: Problem) -> Period:
     """Return the period of a problem; what is true is asked for at recorded samples only."""
-    s = problem.sampling
+    s = problem
     assert s is not None
     steps = int(np.ceil(s.period / longest_step(problem, compiled_sampled_loop(s.loop).plant)))
     every = round(problem.output_interval / s.period)

@@ -57,7 +57,7 @@ class Code(NamedTuple):
 
 def parts_of(problem: Problem) -> list[Part]:
     """Return the functions of a sampled loop, at a point where the robot moves and the joints are stretched."""
-    s = problem.sampling
+    s = problem
     assert s is not None
     compiled = compiled_sampled_loop(s.loop)
     loop, rng = compiled.loop, np.random.default_rng(0)
@@ -166,7 +166,7 @@ def _kinds(op: str, of: str) -> list[str]:
 
 def native_seconds(problem: Problem, periods: int) -> float:
     """Return the time of one period of the compiled loop in all lanes [s], without what Python does around it."""
-    s, lanes = problem.sampling, lane_loop(problem)
+    s, lanes = problem, lane_loop(problem)
     assert s is not None
     compiled = compiled_sampled_loop(s.loop)
     row = compiled.loop.period

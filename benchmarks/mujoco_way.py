@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from passiflex.problems.problem import SampledProblem
 from passiflex.robots.bodies import from_origin, rotation_of
 from passiflex.simulation import Problem
 
@@ -22,9 +23,9 @@ class MujocoPlant:
     """
 
     def __init__(self, problem: Problem, integrator: str, steps: int):
-        assert problem.sampling is not None
+        assert isinstance(problem, SampledProblem)
         self.n, self.steps = problem.law.robot.n, steps
-        text = mjcf(problem, integrator, problem.sampling.period / steps)
+        text = mjcf(problem, integrator, problem.period / steps)
         self.model = mujoco.MjModel.from_xml_string(text)
         self.data = mujoco.MjData(self.model)
         at = [self.model.joint(f"joint_{i}").qposadr[0] for i in range(1, self.n + 1)]

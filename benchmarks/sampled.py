@@ -15,6 +15,7 @@ from rich.table import Table
 
 from passiflex.loops.compiled import CompiledSampledLoop, compiled_sampled_loop
 from passiflex.native import HeldLoop, NativeFunction
+from passiflex.problems.problem import SampledProblem
 from passiflex.simulation import Problem, simulate_problem
 from passiflex.simulation.schedule import PeriodRows
 from passiflex.simulation.simulate_sampled import longest_step, start
@@ -25,13 +26,13 @@ ASKED = 0.8
 
 
 def compiled_of(problem: Problem) -> CompiledSampledLoop:
-    assert problem.sampling is not None
-    return compiled_sampled_loop(problem.sampling.loop)
+    assert isinstance(problem, SampledProblem)
+    return compiled_sampled_loop(problem.loop)
 
 
 def in_machine(problem: Problem, seconds: float) -> None:
     """Run the same loop with CasADi's virtual machine, period by period from Python."""
-    s, compiled = problem.sampling, compiled_of(problem)
+    s, compiled = problem, compiled_of(problem)
     assert s is not None
     loop = HeldLoop(compiled.loop.plant.rhs, compiled.loop.control)
     rows, timing = PeriodRows(problem, compiled.loop.period, compiled.row).take(0, round(seconds / s.period))
@@ -43,7 +44,7 @@ def in_machine(problem: Problem, seconds: float) -> None:
 
 def compiled_from_python(problem: Problem, seconds: float) -> None:
     """Run it with compiled functions, but the loop over periods and steps in Python, as one writes it first."""
-    s, compiled = problem.sampling, compiled_of(problem)
+    s, compiled = problem, compiled_of(problem)
     assert s is not None
     count = round(seconds / s.period)
     rows, _ = PeriodRows(problem, compiled.loop.period, compiled.row).take(0, count)
@@ -77,7 +78,7 @@ def main() -> None:
     console = Console(width=150)
     console.print(machine(), highlight=False)
     problem = problem_of("fig1_sampled")
-    assert problem.sampling is not None
+    assert isinstance(problem, SampledProblem)
     compiled = compiled_of(problem)
     coarse = dataclasses.replace(problem, output_interval=0.005)
     whole, sparse, python, vm = median_times(
@@ -89,23 +90,21 @@ def main() -> None:
     )
     scale = problem.duration / chunk
     x, c, row = (np.tile(v, (2000, 1)) for v in _point(problem, compiled))
-    u = np.tile(np.concatenate([problem.sampling.held, np.zeros(compiled.held.n_s)]), (2000, 1))
+    u = np.tile(np.concatenate([problem.held, np.zeros(compiled.held.n_s)]), (2000, 1))
     rows = [
         Row("30 s at 1 kHz, every sample recorded", whole, python * scale, "compiled, loop in Python", ASKED),
         Row("  same, every fifth recorded", sparse, vm * scale, "CasADi VM, loop in Python", ASKED),
         Row(
             "one period of the controller, in C",
-            per_call(compiled.control, [x, c, row, problem.sampling.numbers], repeats),
+            per_call(compiled.control, [x, c, row, problem.numbers], repeats),
         ),
-        Row(
-            "one slope of the plant, in C", per_call(compiled.plant, [x, u, problem.sampling.plant], repeats)
-        ),
+        Row("one slope of the plant, in C", per_call(compiled.plant, [x, u, problem.plant], repeats)),
     ]
     table = Table("what", "ours", "alternative", "ratio", "asked", "met")
     for line in rows:
         table.add_row(*line.cells())
     console.print(table)
-    steps = int(np.ceil(problem.sampling.period / longest_step(problem, compiled.plant)))
+    steps = int(np.ceil(problem.period / longest_step(problem, compiled.plant)))
     console.print(
         f"- {steps} plant steps of order 4 per period; the controller has {compiled.loop.control.n_instructions()} "
         f"instructions, the plant {compiled.loop.plant.rhs.n_instructions()}; alternatives scaled from {chunk:g} s",

@@ -133,7 +133,7 @@ class HeldPlant(Protocol):
 
 def through_samples(problem: Problem, advance: HeldPlant, seconds: float) -> Motion:
     """Return the motion of a plant under the law."""
-    s = problem.sampling
+    s = problem
     assert s is not None
     law, told, periods = SampledLaw(problem), orders(problem), round(seconds / s.period)
     first = [int(np.ceil(order.time / s.period - 1e-6)) for order in told]

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 import plain
+from passiflex.problems.problem import SampledProblem
 from passiflex.simulation import Problem
 
 Array = NDArray[np.float64]
@@ -16,10 +17,10 @@ class ScipyPlant:
     """The robot of a problem, from rest at its start; a call holds torques and wrench for a period."""
 
     def __init__(self, problem: Problem, method: str, rtol: float, atol: float):
-        assert problem.sampling is not None
+        assert isinstance(problem, SampledProblem)
         robot = problem.law.robot
         self.robot = plain.Robot(robot.arm.chain.to_urdf(), robot.layout.unpack(problem.plant))
-        self.n, self.period = robot.n, problem.sampling.period
+        self.n, self.period = robot.n, problem.period
         self.x = np.concatenate([problem.q, problem.theta, np.zeros(2 * robot.n)])
         self.options = {"method": method, "rtol": rtol, "atol": atol}
         self.tau_m, self.F_e, self.calls = np.zeros(robot.n), np.zeros(6), 0

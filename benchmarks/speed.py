@@ -31,6 +31,7 @@ import plain
 from passiflex.control.motion import MOTION
 from passiflex.native import DRIVER, NativeFunction, find_compiler, library
 from passiflex.simulation import (
+    ClosedLoop,
     CompiledLoop,
     Problem,
     Run,
@@ -48,10 +49,10 @@ COMPILE = """
 import time
 start = time.perf_counter()
 from importlib import resources
-from passiflex.simulation import load_scenario, resolve, compiled_loop
+from passiflex.simulation import ClosedLoop, load_scenario, resolve, compiled_loop
 problem = resolve(load_scenario(resources.files("passiflex.studies") / "scenarios" / "fig1.yaml"))
 begun = time.perf_counter()
-compiled_loop(problem.law)
+compiled_loop(ClosedLoop(problem.law))
 print(begun - start, time.perf_counter() - begun)
 """
 
@@ -148,7 +149,7 @@ def same_field(loop: CompiledLoop, problem: Problem, points: int, rng: np.random
     for _ in range(points):
         x, u = random_point(loop, problem, rng)
         other.F_e, other.noise = u[loop.loop.inputs.slices["F_e"]], u[loop.loop.inputs.slices["torque_noise"]]
-        ours = loop.fixed_step.rhs(x, u, problem.parameters)[0][:-1]  # without the reference's clock
+        ours = loop.fixed_step.rhs(x, u, problem.numbers)[0][:-1]  # without the reference's clock
         difference = np.linalg.norm(ours - other(0.0, x[:-1])) / np.linalg.norm(ours)
         worst = max(worst, float(difference))
     return worst
@@ -159,7 +160,7 @@ def field_rows(
 ) -> tuple[list[Row], str]:
     points = [random_point(loop, problem, rng) for _ in range(2000)]
     x, u = (np.array(column) for column in zip(*points, strict=True))
-    few, p = 200, problem.parameters
+    few, p = 200, problem.numbers
     native, machine, other = loop.fixed_step.rhs, NativeFunction(loop.loop.rhs), plain.PlainLoop(problem)
     times = by_turns(
         repeats,
@@ -350,7 +351,7 @@ def main() -> None:
     console, rng = Console(width=150), np.random.default_rng(0)
     console.print(machine(), highlight=False)
     fig1, fig3 = problem_of("fig1"), problem_of("fig3")
-    loop = compiled_loop(fig1.law)
+    loop = compiled_loop(ClosedLoop(fig1.law))
     apart = [same_field(loop, problem, 200, rng) for problem in (fig1, fig3)]
     if max(apart) > SAME:
         raise SystemExit(

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import casadi as cs
 
 import passiflex as pf
+from passiflex.elements import AbstractElement, nothing
 from passiflex.layout import Layout
-from passiflex.loops.elements import AbstractElement, nothing
 
 
 @dataclass(frozen=True)

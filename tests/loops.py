@@ -96,7 +96,7 @@ class PaperCoordinates:
     """The closed loop of plant and law, seen in the state (q, φ, p, z, n, x_d) of (24).
 
     `function` is (x, u, p) → that state, its rate along `ClosedLoop.rhs` by the chain rule,
-    (τ_e, τ_u, ẋ_d), and the powers of `ENERGIES`.
+    (τ_e, τ_u, ẋ_d), and the powers of `loop.energies`.
     """
 
     loop: ClosedLoop
@@ -107,11 +107,8 @@ class PaperCoordinates:
         loop = ClosedLoop(law)
         x, s = loop.state.symbols("x")
         u, w = loop.inputs.symbols("u")
-        p = cs.SX.sym("p", sum(part.size for part in loop.parameters))
-        sizes = np.cumsum([part.size for part in loop.parameters])
-        m = loop.parameters[0].view(p[: sizes[0]])
-        g = law.layout.view(p[sizes[1] : sizes[2]])
-        tank = loop.tank.layout.view(p[sizes[2] :])
+        p = cs.SX.sym("p", loop.parameters.size)
+        m, _, g, tank = loop.parameters.view(p).values()
         rate, powers = loop.rhs(x, u, p)
         outputs = loop.output_layout.view(loop.outputs(x, u, p))
         phi, dphi = shaped_motion(s.q, s.theta, s.dq, s.dtheta, m.joint_stiffness, g.shaped_stiffness)

@@ -9,7 +9,7 @@ import pytest
 SOURCE = Path(__file__).parents[1] / "src" / "passiflex"
 MODULES = sorted(SOURCE.rglob("*.py"))
 
-FOUNDATION = ("version", "origin", "lazy", "errors", "layout", "files")
+FOUNDATION = ("version", "origin", "lazy", "errors", "layout", "parts", "files")
 ROOMS = (
     *FOUNDATION,
     "texts",
@@ -17,6 +17,7 @@ ROOMS = (
     "phs",
     "control",
     "sampled",
+    "elements",
     "native",
     "scenarios",
     "loops",

@@ -5,9 +5,10 @@
     run = pf.simulate(pf.shipped_scenario("fig1"))
     print(pf.audit(run).verdict)
 
-The rooms, in the order in which they may import each other: `texts`, `robots`, `phs`, `control`, `sampled`, `native`;
-`scenarios`, `loops`, `problems`, `stability`, `runs`, `simulation`; `passivity`, `responses`, `limits`, `chunks`,
-`campaigns`; then what looks at their results: `diagrams`, `plotting`, `reports`, `exports`; then `studies`, `cli`.
+The rooms, in the order in which they may import each other: `texts`, `robots`, `phs`, `control`, `sampled`, `elements`,
+`native`; `scenarios`, `loops`, `problems`, `stability`, `runs`, `simulation`; `passivity`, `responses`, `limits`,
+`chunks`, `campaigns`; then what looks at their results: `diagrams`, `plotting`, `reports`, `exports`; then `studies`,
+`cli`.
 """
 
 from __future__ import annotations

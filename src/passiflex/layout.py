@@ -7,7 +7,7 @@ Matrices are stored row by row.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from math import prod
@@ -50,11 +50,30 @@ class Field(NamedTuple):
         return prod(self.shape)
 
 
+class Signal(NamedTuple):
+    """What a field is, and the expression that it is made of."""
+
+    field: Field
+    value: cs.SX
+
+
 @dataclass(frozen=True)
 class Layout:
     """An ordered set of fields in one flat vector."""
 
     fields: tuple[Field, ...]
+
+    def __post_init__(self) -> None:
+        """Refuse two fields of one name."""
+        names = [f.name for f in self.fields]
+        if len(set(names)) < len(names):
+            twice = sorted({name for name in names if names.count(name) > 1})
+            raise ValueRangeError("a layout has two fields of one name", got=", ".join(twice))
+
+    @classmethod
+    def of(cls, signals: Iterable[Signal]) -> Layout:
+        """Return the fields of signals."""
+        return cls(tuple(signal.field for signal in signals))
 
     def __iter__(self) -> Iterator[Field]:
         return iter(self.fields)
@@ -111,6 +130,10 @@ class Layout:
                 raise SizeError(f"{f.name!r} has the wrong size", got=part.numel(), needs=f"shape {f.shape}")
             parts.append(part)
         return cs.vertcat(*parts)
+
+    def stack_of(self, signals: Iterable[Signal]) -> cs.SX:
+        """Return the flat symbolic vector of signals."""
+        return self.stack({signal.field.name: signal.value for signal in signals})
 
     def pack(self, values: Mapping[str, ArrayLike]) -> NDArray[np.float64]:
         """Return the flat vector of named numbers.

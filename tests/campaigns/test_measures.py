@@ -14,7 +14,7 @@ import pytest
 import passiflex
 from passiflex.campaigns import measures as module
 from passiflex.campaigns.measures import MEASURES, SIGNALS, measures
-from passiflex.problems.problem import Event
+from passiflex.problems.problem import Event, SampledProblem
 from passiflex.responses.msd import ideal_response
 from passiflex.responses.steps import step_window
 from passiflex.simulation import Run, Scenario, resolve, simulate_problem
@@ -87,7 +87,7 @@ def scenario(name: str) -> Scenario:
 @lru_cache
 def run_of(name: str) -> Run:
     problem = resolve(scenario(name))
-    return simulate_in_lane(problem) if problem.sampling else simulate_problem(problem)
+    return simulate_in_lane(problem) if isinstance(problem, SampledProblem) else simulate_problem(problem)
 
 
 @lru_cache

@@ -128,7 +128,7 @@ def test_a_scenario_is_asked_for_with_what_the_command_was_told(
         in limits(capsys, monkeypatch, scenario, *words, "--recommend").out
     )
     ((problem,), options) = told.pop()
-    assert (problem.sampling.period, options) == (1 / 2000, {"inner_loop": "plain"})
+    assert (problem.period, options) == (1 / 2000, {"inner_loop": "plain"})
 
 
 @pytest.mark.parametrize(

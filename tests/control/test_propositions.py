@@ -27,7 +27,6 @@ from passiflex.control import (
     StaticGravity,
 )
 from passiflex.control.systems import augmented_system, impedance_system, shaped_system
-from passiflex.loops.closed_loop import ENERGIES
 from passiflex.phs import PortHamiltonianSystem
 from passiflex.robots.flexible import FlexibleJointRobot
 
@@ -69,7 +68,7 @@ class Sample:
         x = case.paper.random_state(rng, tank_energy=rng.uniform(0.1, 5))
         u = case.paper.random_input(rng)
         self.state, self.rate, self.tau_e, self.tau_u, self.twist, powers = case.paper(x, u, p)
-        self.power = {k: v.item() for k, v in ENERGIES.unpack(powers).items()}
+        self.power = {k: v.item() for k, v in case.paper.loop.energies.unpack(powers).items()}
         parts = ("joint_damping", "cartesian_damping", "null_space_damping")
         self.P_D, self.P_X = sum(self.power[k] for k in parts), self.power["reference"]
 

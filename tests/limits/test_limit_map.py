@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from functools import lru_cache
 from pathlib import Path
@@ -20,6 +19,7 @@ from passiflex.limits.limit_map import DAMPING_SCALES, INERTIA_RATIOS, STIFFNESS
 from passiflex.limits.planes import Plane, least_inertias, scaled_impedance, stable_damping, within
 from passiflex.limits.subject import sampled_problem, with_task
 from passiflex.problems.altered import altered
+from passiflex.problems.problem import SampledProblem
 from passiflex.simulation import Problem, parse_scenario, resolve
 from passiflex.stability import admissible as border
 from passiflex.stability.admissible import shaping
@@ -210,7 +210,7 @@ def test_nothing_that_hides_a_growing_motion_is_left() -> None:
     ours, plain = (growth(disturbed(p)) for p in (rough, problem()))
     assert ours == pytest.approx(plain, rel=1e-6)
     with pytest.raises(ValueRangeError, match="no control rate"):
-        disturbed(dataclasses.replace(problem(), sampling=None))
+        disturbed(resolve(world(control=None, tank=None)))
 
 
 def test_a_point_says_what_theory_and_simulation_say() -> None:
@@ -247,8 +247,8 @@ def test_what_runs_in_continuous_time_needs_a_rate() -> None:
     with pytest.raises(ValueRangeError, match=r"no control rate.*try --rate '1 kHz', or rate=1000"):
         limit_map(plain)
     sampled = sampled_problem(plain, "2 kHz")
-    assert sampled.sampling is not None
-    assert (sampled.sampling.period, sampled.sampling.delay) == (5e-4, 0)
+    assert isinstance(sampled, SampledProblem)
+    assert (sampled.period, sampled.delay) == (5e-4, 0)
     assert sampled.law.robot is plain.law.robot
     assert check(world(control=None, tank=None), 2000.0).rate == 2000
 
@@ -316,6 +316,6 @@ def test_a_problem_takes_another_inner_loop_as_its_scenario_does() -> None:
     loops = [sampled_problem(s, inner_loop="matched") for s in (problem(), world(control={"delay": HALF}))]
     written = resolve(world(control={"delay": HALF, "inner_loop": "matched"}))
     for loop in loops:
-        assert loop.configuration.replace(", changed in memory", "") == written.configuration
+        assert loop.text.replace(", changed in memory", "") == written.text
         assert check(loop).spectrum.radius == check(written).spectrum.radius
     assert check(problem()).spectrum.radius != check(written).spectrum.radius

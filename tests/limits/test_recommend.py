@@ -19,6 +19,7 @@ from passiflex.limits.margin_box import MarginBox, Member
 from passiflex.limits.recommend_for import recommend_for
 from passiflex.limits.torque_noise import rms_torque, torque_by_noise
 from passiflex.limits.workspace import workspace_postures
+from passiflex.problems.problem import SampledProblem
 from passiflex.robots import FlexibleJointRobot
 from passiflex.simulation import Problem, parse_scenario, resolve, simulate, simulate_problem
 from passiflex.stability.linear_loop import DrivenLoop, LinearLoop
@@ -220,8 +221,8 @@ def test_the_snippet_is_accepted_as_it_is(inner: str) -> None:
         numbers = problem.law.layout.unpack(problem.gains)
         np.testing.assert_allclose(numbers["shaped_inertia"], found.shaped_inertia, rtol=1e-9)
         np.testing.assert_array_equal(numbers["shaped_stiffness"], robot().joint_stiffness)
-        assert problem.sampling is not None
-        assert (problem.sampling.period, problem.sampling.delay) == (1e-3, 1e-3)
+        assert isinstance(problem, SampledProblem)
+        assert (problem.period, problem.delay) == (1e-3, 1e-3)
         np.testing.assert_allclose(found.inertia_ratio, found.shaped_inertia / robot().motor_inertia)
 
 

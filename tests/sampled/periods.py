@@ -37,7 +37,7 @@ OFF = {
     "posture": 0.3,
 }
 LEDGER = Layout(
-    tuple(Field(name, (), "J") for name in TankEntry._fields)
+    tuple(Field({"fault": "tank_fault"}.get(name, name), (), "J") for name in TankEntry._fields)
     + tuple(Field(name, (), "") for name in LedgerEntry._fields[1:])
 )
 """`LedgerEntry` with its tank's entry first; `fault` is the period's."""
@@ -67,9 +67,9 @@ class Rig:
         state = cs.SX.sym("state", self.controller.state.size)
         told, t = self.told.symbols("told")
         y, setpoint = _said(t)
-        p = cs.SX.sym("p", sum(part.size for part in self.controller.parameters))
+        p = cs.SX.sym("p", self.controller.parameters.size)
         step = self.controller.step(
-            y, setpoint, t.elapsed, t.given, state, _split(self.controller.parameters, p)
+            y, setpoint, t.elapsed, t.given, state, ControlParameters(**self.controller.parameters.view(p))
         )
         ledger = cs.vertcat(*step.entry.tank, *step.entry[1:])
         outputs = [step.state, step.command.tau_m, ledger]
@@ -79,9 +79,9 @@ class Rig:
     def alone(self) -> cs.Function:
         """Return (told, p, added) → τ_m of the law alone with the gains of the setpoint, S without U, U, f(φ), φ̇."""
         law, (told, t) = self.controller.law, self.told.symbols("told")
-        p = cs.SX.sym("p", sum(part.size for part in self.controller.parameters))
+        p = cs.SX.sym("p", self.controller.parameters.size)
         added, (y, setpoint) = cs.SX.sym("added", self.n), _said(t)
-        views = _split(self.controller.parameters, p)
+        views = ControlParameters(**self.controller.parameters.view(p))
         gains = SimpleNamespace(**(vars(views.gains) | {"stiffness": t.stiffness, "damping": t.damping}))
         command = law.command(y, Reference(setpoint.pose, setpoint.velocity), views.model, gains, added)
         stored = law.stored(y, views.model, gains)
@@ -93,8 +93,8 @@ class Rig:
     def actions(self) -> cs.Function:
         """Return (told, p) → the torque of all actions, ungated."""
         law, (told, t) = self.controller.law, self.told.symbols("told")
-        p = cs.SX.sym("p", sum(part.size for part in self.controller.parameters))
-        views, rows = _split(self.controller.parameters, p), slice(0, law.task.size)
+        p = cs.SX.sym("p", self.controller.parameters.size)
+        views, rows = ControlParameters(**self.controller.parameters.view(p)), slice(0, law.task.size)
         m, g, a, (y, setpoint) = views.model, views.gains, views.actions, _said(t)
         stored = law.stored(y, m, g)
         phi, dphi = stored.phi, stored.dphi
@@ -128,14 +128,14 @@ class Rig:
             tank={f"tank_{name}": value for name, value in (LEVELS | levels).items()},
             actions={f.name: np.broadcast_to(shares[f.name], f.shape) for f in action_layout(self.n)},
             observer={"bandwidth": 50.0},
-            inner={f.name: 0.5 for f in parts[-2]},
-            errors={f.name: np.zeros(f.shape) for f in parts[-1]} | {"torque_bandwidth": UNFILTERED},
+            inner={f.name: 0.5 for f in parts["inner"]},
+            errors={f.name: np.zeros(f.shape) for f in parts["errors"]} | {"torque_bandwidth": UNFILTERED},
         )
-        return np.concatenate([part.pack(value) for part, value in zip(parts, values, strict=True)])
+        return parts.pack(values._asdict())
 
     def fallen(self, p: np.ndarray) -> np.ndarray:
         """Return p with the fallback's gains as those of the law."""
-        model, gains = (part.size for part in self.controller.parameters[:2])
+        model, gains = (self.controller.parameters[part].size for part in ("model", "gains"))
         out = p.copy()
         out[model : model + gains] = p[model + gains : model + 2 * gains]
         return out
@@ -196,13 +196,6 @@ def _said(t: SimpleNamespace) -> tuple[Measurement, Setpoint]:
     pose = EndEffectorPose(t.position, t.rotation)
     setpoint = Setpoint(pose, t.velocity, t.acceleration, t.stiffness, t.damping, t.wrench)
     return Measurement(*(getattr(t, name) for name in Measurement._fields)), setpoint
-
-
-def _split(parts: tuple[Layout, ...], p: cs.SX) -> ControlParameters:
-    ends = np.cumsum([part.size for part in parts])
-    return ControlParameters(
-        *(part.view(p[end - part.size : end]) for part, end in zip(parts, ends, strict=True))
-    )
 
 
 @lru_cache

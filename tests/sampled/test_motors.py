@@ -11,7 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from loops import SEEDS
-from passiflex.sampled.motors import UNLIMITED_TORQUE, friction, friction_layout, limit_layout, limited
+from passiflex.elements.friction import MotorFriction, friction
+from passiflex.sampled.motors import UNLIMITED_TORQUE, limit_layout, limited
 
 N = 3
 EPSILON = np.finfo(float).eps
@@ -149,7 +150,7 @@ def test_viscous_friction_is_linear() -> None:
 
 def test_layouts_name_what_the_functions_take() -> None:
     assert [f.size for f in limit_layout(N)] == [N, N]
-    assert [(f.name, f.size) for f in friction_layout(N)] == [
+    assert [(f.name, f.size) for f in MotorFriction().parameters(N)] == [
         ("coulomb_friction", N),
         ("viscous_friction", N),
         ("friction_width", 1),

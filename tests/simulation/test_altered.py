@@ -12,6 +12,7 @@ from passiflex.control.motion import pose_at
 from passiflex.errors import NameUnknownError, PassiflexError, SizeError, ValueRangeError
 from passiflex.problems.altered import MOST_PERIODS, altered, at_rate
 from passiflex.problems.posture import posture
+from passiflex.problems.problem import SampledProblem
 from passiflex.sampled.matched_loop import MatchedInnerLoop
 from passiflex.simulation import Problem, parse_scenario, resolve
 from worlds import PLAIN, world
@@ -33,15 +34,15 @@ def problem(**changes: Any) -> Problem:
 
 def require_same(one: Problem, other: Problem) -> None:
     """Compare every number; those that are worked out by another way, up to rounding."""
-    assert one.sampling is not None
-    assert other.sampling is not None
-    for name in ("gains", "plant", "model", "q", "theta", "tank_gains"):
+    assert isinstance(one, SampledProblem)
+    assert isinstance(other, SampledProblem)
+    for name in ("gains", "plant", "model", "q", "theta"):
         np.testing.assert_allclose(getattr(one, name), getattr(other, name), rtol=1e-12, atol=1e-12)
     for name in ("numbers", "plant", "held"):
-        np.testing.assert_allclose(getattr(one.sampling, name), getattr(other.sampling, name), rtol=1e-12)
+        np.testing.assert_allclose(getattr(one, name), getattr(other, name), rtol=1e-12)
     for name in ("period", "delay", "jitter", "missed", "allow_unstable"):
-        assert getattr(one.sampling, name) == getattr(other.sampling, name)
-    assert one.sampling.controller.inner == other.sampling.controller.inner
+        assert getattr(one, name) == getattr(other, name)
+    assert one.controller.inner == other.controller.inner
     assert (one.noise, one.output_interval, one.duration) == (
         other.noise,
         other.output_interval,
@@ -73,19 +74,19 @@ CHANGES: dict[str, dict[str, Any]] = {
 @pytest.mark.parametrize("change", CHANGES)
 def test_an_altered_problem_is_what_its_configuration_says(change: str) -> None:
     changed = altered(problem(), **CHANGES[change])
-    require_same(changed, resolve(parse_scenario(changed.configuration)))
+    require_same(changed, resolve(parse_scenario(changed.text)))
 
 
 def test_what_is_given_is_in_force_and_the_rest_stays() -> None:
     before = problem()
     after = altered(before, rate=2000.0, delay=1.5e-3, gains={"stiffness": 90 * np.eye(3)})
-    assert before.sampling is not None
-    assert after.sampling is not None
-    assert (after.sampling.period, after.sampling.delay) == (5e-4, 1.5e-3)
-    assert after.sampling.controller.inner == MatchedInnerLoop(3)
-    assert before.sampling.controller.inner == MatchedInnerLoop(1)
-    parts = after.sampling.loop.parameters
-    assert parts.unpack("inner", after.sampling.numbers)["period"] == 5e-4
+    assert isinstance(before, SampledProblem)
+    assert isinstance(after, SampledProblem)
+    assert (after.period, after.delay) == (5e-4, 1.5e-3)
+    assert after.controller.inner == MatchedInnerLoop(3)
+    assert before.controller.inner == MatchedInnerLoop(1)
+    parts = after.loop.parameters
+    assert parts.unpack("inner", after.numbers)["period"] == 5e-4
     ours, theirs = (p.law.layout.unpack(p.gains) for p in (after, before))
     np.testing.assert_array_equal(ours["stiffness"], 90 * np.eye(3))
     for name in ("damping", "shaped_stiffness", "shaped_inertia"):
@@ -97,14 +98,13 @@ def test_a_changed_plant_rests_under_its_own_weight_and_the_law_knows_nothing_of
     robot = before.law.robot
     heavy = {"link_mass": 1.5 * robot.layout.unpack(before.plant)["link_mass"], "joint_stiffness": [4e3, 3e3]}
     after = altered(before, plant=heavy)
-    assert after.sampling is not None
+    assert isinstance(after, SampledProblem)
     numbers = robot.layout.unpack(after.plant)
     weight = posture(robot, after.q, numbers).gravity_torque
-    np.testing.assert_allclose(after.sampling.held, weight, rtol=1e-12)
+    np.testing.assert_allclose(after.held, weight, rtol=1e-12)
     np.testing.assert_allclose(numbers["joint_stiffness"] * (after.theta - after.q), weight, rtol=1e-9)
     np.testing.assert_array_equal(after.model, before.model)
-    np.testing.assert_array_equal(after.sampling.plant[: robot.layout.size], after.plant)
-    assert "planar2r, changed in memory" in after.configuration
+    assert "planar2r, changed in memory" in after.text
 
 
 def test_a_scenario_in_continuous_time_becomes_a_sampled_one() -> None:
@@ -115,7 +115,7 @@ def test_a_scenario_in_continuous_time_becomes_a_sampled_one() -> None:
     assert sampled.control is not None
     assert (sampled.control.rate, sampled.control.delay, sampled.control.inner_loop) == (400.0, 1e-3, "plain")
     assert sampled.output_interval == pytest.approx(2.5e-3)
-    assert resolve(sampled).sampling is not None
+    assert resolve(sampled) is not None
     with pytest.raises(ValueRangeError, match="'planar' has no control rate; needs `control"):
         at_rate(continuous)
 
@@ -131,11 +131,11 @@ def test_at_rate_says_what_altered_does() -> None:
 def test_noise_is_held_for_as_many_periods_as_before(periods: int, change: dict[str, float]) -> None:
     before = problem(noise={"torque_variance": 0.1, "hold": periods * 1e-3})
     after = altered(before, **change)
-    assert after.sampling is not None
+    assert isinstance(after, SampledProblem)
     assert after.noise is not None
-    assert after.noise.hold == periods * after.sampling.period
-    require_same(after, resolve(parse_scenario(after.configuration)))
-    require_same(after, resolve(at_rate(parse_scenario(before.configuration), **change)))
+    assert after.noise.hold == periods * after.period
+    require_same(after, resolve(parse_scenario(after.text)))
+    require_same(after, resolve(at_rate(parse_scenario(before.text), **change)))
 
 
 def test_noise_of_a_scenario_in_continuous_time_is_drawn_in_each_period() -> None:
@@ -171,8 +171,8 @@ def test_what_makes_no_sense_is_refused(
 
 def test_the_longest_delay_is_one_that_the_loop_can_hold() -> None:
     longest = altered(resolve(world()), delay=MOST_PERIODS * 1e-3)
-    assert longest.sampling is not None
-    assert longest.sampling.delay == MOST_PERIODS * 1e-3
+    assert isinstance(longest, SampledProblem)
+    assert longest.delay == MOST_PERIODS * 1e-3
 
 
 def test_a_problem_in_continuous_time_cannot_be_altered() -> None:

@@ -13,7 +13,7 @@ from passiflex.errors import NameUnknownError, SimulationError
 from passiflex.loops.compiled import compiled_sampled_loop
 from passiflex.native import find_compiler
 from passiflex.problems.altered import altered
-from passiflex.problems.problem import Problem
+from passiflex.problems.problem import Problem, SampledProblem
 from passiflex.simulation import Run, batch, resolve
 from passiflex.simulation.batch import Recording, digest_batch, lane_loop, simulate_batch
 from passiflex.simulation.simulate_sampled import longest_step, simulate_unchecked
@@ -143,8 +143,8 @@ def test_each_takes_steps_of_its_own_length(planar: Problem) -> None:
         dataclasses.replace(altered(planar, plant={"joint_stiffness": [k, k]}), duration=0.2)
         for k in (200e3, 5e3, 80e3, 4e3, 40e3, 6e3)
     ]
-    assert planar.sampling is not None
-    plant = compiled_sampled_loop(planar.sampling.loop).plant
+    assert isinstance(planar, SampledProblem)
+    plant = compiled_sampled_loop(planar.loop).plant
     steps = [int(np.ceil(PERIOD / longest_step(problem, plant))) for problem in fleet]
     assert len(set(steps)) >= 3
     keep = ["q", "dq", "theta", "tank_energy", "joint_spring_energy"]

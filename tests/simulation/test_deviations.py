@@ -11,6 +11,7 @@ import pytest
 from passiflex.errors import SizeError
 from passiflex.problems.altered import altered
 from passiflex.problems.posture import posture
+from passiflex.problems.problem import SampledProblem
 from passiflex.problems.resolution import SCALED
 from passiflex.robots.flexible import RobotState
 from passiflex.simulation import ClosedLoop, Problem, parse_scenario, resolve, simulate
@@ -88,8 +89,8 @@ def test_the_arm_rests_under_its_true_weight(control: dict[str, Any]) -> None:
     np.testing.assert_allclose(
         p.theta - p.q, weight / (p.law.robot.joint_stiffness * np.array([1.2, 0.7])), rtol=1e-9
     )
-    if p.sampling is not None:
-        np.testing.assert_allclose(p.sampling.held, weight, rtol=1e-12)
+    if isinstance(p, SampledProblem):
+        np.testing.assert_allclose(p.held, weight, rtol=1e-12)
 
 
 def accelerations(p: Problem, tau_m: np.ndarray) -> np.ndarray:
@@ -99,18 +100,18 @@ def accelerations(p: Problem, tau_m: np.ndarray) -> np.ndarray:
     x = RobotState(cs.SX(p.q), cs.SX(p.theta), zero, zero)
     found = robot.acceleration(x, cs.SX(tau_m), zero, m)
     both = cs.Function("start", [vector], [cs.vertcat(found.ddq, found.ddtheta)])
-    return np.array(both(p.plant)).ravel()
+    return np.array(both(p.plant[: robot.layout.size])).ravel()
 
 
 @pytest.mark.parametrize("gravity", ["static", "robot"])
 def test_the_deviating_robot_starts_in_equilibrium(gravity: str) -> None:
     """Under the torque that the motors hold until the first command: q̈ = θ̈ = 0, to K · ε · |q| over the inertia."""
     p = problem(law={"gravity": gravity}, deviations=EACH)
-    assert p.sampling is not None
-    assert np.abs(accelerations(p, p.sampling.held)).max() < 1e-8
+    assert isinstance(p, SampledProblem)
+    assert np.abs(accelerations(p, p.held)).max() < 1e-8
     if gravity == "static":
-        described = problem(law={"gravity": gravity}).sampling
-        assert described is not None
+        described = problem(law={"gravity": gravity})
+        assert isinstance(described, SampledProblem)
         assert np.abs(accelerations(p, described.held)).max() > 1
 
 
@@ -128,7 +129,7 @@ def closed_loop(p: Problem) -> tuple[np.ndarray, np.ndarray]:
     motion = p.events[0].motion
     assert motion is not None
     u = loop.inputs.pack({**motion, "F_e": p.events[0].F_e, "torque_noise": zero})
-    rate = loop.state.unpack(np.array(loop.rhs(loop.state.pack(start), u, p.parameters)[0]).ravel())
+    rate = loop.state.unpack(np.array(loop.rhs(loop.state.pack(start), u, p.numbers)[0]).ravel())
     return rate["dq"], rate["dtheta"]
 
 
@@ -171,13 +172,13 @@ def test_the_law_knows_nothing_of_the_deviations(damping: dict[str, Any]) -> Non
         "model_errors": {"link_inertia": [0.2, 0.3]},
     }
     described, deviating = problem(**changes), problem(**changes, deviations=EACH)
-    assert described.sampling is not None
-    assert deviating.sampling is not None
-    for name in ("model", "gains", "tank_gains"):
+    assert isinstance(described, SampledProblem)
+    assert isinstance(deviating, SampledProblem)
+    for name in ("model", "gains"):
         np.testing.assert_array_equal(getattr(deviating, name), getattr(described, name))
-    first = described.sampling.plant.size
-    np.testing.assert_array_equal(deviating.sampling.numbers[first:], described.sampling.numbers[first:])
-    assert np.abs(deviating.sampling.plant - described.sampling.plant).max() > 0.1
+    first = described.plant.size
+    np.testing.assert_array_equal(deviating.numbers[first:], described.numbers[first:])
+    assert np.abs(deviating.plant - described.plant).max() > 0.1
 
 
 @pytest.mark.parametrize("gravity", ["static", "robot"])
@@ -189,12 +190,12 @@ def test_deviations_are_what_altering_the_plant_does(gravity: str) -> None:
     }
     ours = problem(**changes, deviations=EACH)
     theirs = altered(problem(**changes), plant={k: plant(ours)[k] for v in SCALED.values() for k in v})
-    assert ours.sampling is not None
-    assert theirs.sampling is not None
+    assert isinstance(ours, SampledProblem)
+    assert isinstance(theirs, SampledProblem)
     for name in ("plant", "model", "gains", "theta"):
         np.testing.assert_allclose(getattr(ours, name), getattr(theirs, name), rtol=1e-14)
-    np.testing.assert_allclose(ours.sampling.numbers, theirs.sampling.numbers, rtol=1e-14)
-    np.testing.assert_allclose(ours.sampling.held, theirs.sampling.held, rtol=1e-12, atol=1e-15)
+    np.testing.assert_allclose(ours.numbers, theirs.numbers, rtol=1e-14)
+    np.testing.assert_allclose(ours.held, theirs.held, rtol=1e-12, atol=1e-15)
     np.testing.assert_allclose(ours.home.position, theirs.home.position, atol=1e-15)
 
 
@@ -217,7 +218,7 @@ def test_link_inertia_is_that_of_the_link_which_the_joint_moves() -> None:
 
 def test_deviations_are_in_the_stored_configuration() -> None:
     p = problem(deviations=EACH, model_errors={"joint_damping": [0.1, 0.2]})
-    again = resolve(parse_scenario(p.configuration))
+    again = resolve(parse_scenario(p.text))
     np.testing.assert_array_equal(again.plant, p.plant)
     np.testing.assert_array_equal(again.model, p.model)
-    assert again.configuration == p.configuration
+    assert again.text == p.text

@@ -13,8 +13,8 @@ from hypothesis import given, settings
 
 from arms import serial_chains
 from loops import SEEDS, with_joints
+from passiflex.elements import AbstractElement, Drag, Effect, MotorFriction, Touch, nothing
 from passiflex.layout import Field, Layout
-from passiflex.loops.elements import AbstractElement, Drag, Effect, MotorFriction, Touch, nothing
 from passiflex.loops.plant import ELEMENTS, Plant
 from passiflex.robots.chain import SerialChain
 from passiflex.robots.flexible import FlexibleJointRobot
@@ -32,7 +32,8 @@ def balance(element: AbstractElement, seed: int) -> tuple[float, float]:
     m, s = (numbers(layout, rng) for layout in (element.parameters(N), element.inputs()))
     speed = 10 ** rng.uniform(-6, 1)
     parts = [cs.SX(rng.normal(size=N) * scale) for scale in (1, 1, speed, speed)]
-    at = Touch(_state(parts), cs.SX(rng.normal(size=3) * speed), cs.SX(rng.normal(size=3) * speed))
+    vectors = [cs.SX(rng.normal(size=3) * speed) for _ in range(2)]
+    at = Touch(_state(parts), *vectors, cs.SX(rng.normal(size=3)), cs.SX.eye(3), SimpleNamespace())
     effect = element.act(at, _expressions(s), _expressions(m))
     at_tip = cs.dot(effect.force, at.velocity) + cs.dot(effect.moment, at.spin)
     given = cs.dot(effect.motor, at.x.dtheta) + at_tip
@@ -94,7 +95,7 @@ def test_what_passes_the_ports_is_what_the_robot_stores_and_loses(chain: SerialC
     state, u = cs.SX.sym("x", 4 * n), cs.SX.sym("u", n + plant.environment.size)
     p, m = plant.parameters.symbols("p")
     x, s = plant.view(state), plant.environment.view(u[n:])
-    true = plant.true(x, s, m)
+    true = {signal.field.name: signal.value for signal in plant.true(state, s, m)}
     parts = ("link_kinetic", "motor_kinetic", "joint_spring", "potential")
     energy = sum(true[f"{part}_energy"] for part in parts)
     slope, powers = plant.rhs(state, u, p)
@@ -124,4 +125,6 @@ def test_a_plant_has_the_numbers_of_what_touches_it() -> None:
     extra = {f.name for f in touched.parameters} - {f.name for f in bare.parameters}
     assert extra == {"coulomb_friction", "viscous_friction", "friction_width"}
     assert {f.name for f in touched.environment} == {"F_e", *(f.name for f in Drag().inputs())}
-    assert [f.name for f in touched.energies][-1] == "friction"
+    assert [f.name for f in touched.energies][-2:] == ["friction", "drag"]
+    resting = Plant(robot, (MotorFriction(acts=False), Drag(acts=False)))
+    assert [f.name for f in resting.energies][-1] == "friction"

@@ -170,7 +170,7 @@ def test_an_unstable_loop_is_refused_with_gains_that_hold(delay: float) -> None:
     with pytest.raises(UnstableLoopError, match="the law of 'planar' does not hold"):
         simulate_problem(problem)
     first = advise(problem, judge(problem)).remedies[0]
-    wanted = yaml.safe_load(rewritten(problem.configuration, first.entry))
+    wanted = yaml.safe_load(rewritten(problem.text, first.entry))
     run = simulate(parse_scenario(yaml.safe_dump(wanted | {"tank": {"kind": "port", "initial": 2.0}})))
     assert not run.failure
     assert not run["latched"].any()

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from passiflex.control.motion import circle
 from passiflex.errors import SimulationError
-from passiflex.loops.closed_loop import ENERGIES
+from passiflex.loops.closed_loop import ClosedLoop
 from passiflex.native import fastest_pole
 from passiflex.simulation import CompiledLoop, Problem, Run, Scenario, compiled_loop, resolve, simulate
 from passiflex.simulation.integrate import SLOW_POLE, held_stretch, resolved_stretch, smooth_stretch
@@ -48,7 +48,7 @@ def planar(**changes: Any) -> Scenario:
 def loop() -> tuple[Problem, CompiledLoop, np.ndarray, np.ndarray]:
     """Return the planar problem, its functions, and a moving start (x, u)."""
     problem = resolve(planar())
-    compiled = compiled_loop(problem.law)
+    compiled = compiled_loop(ClosedLoop(problem.law))
     n = problem.law.robot.n
     start = {
         "q": problem.q,
@@ -70,13 +70,13 @@ def test_order_of_runge_kutta_is_four_on_the_closed_loop() -> None:
     hλ is 0.3 and less, where the next order (5) still counts for a part hλ of it.
     """
     problem, compiled, x, u = loop()
-    pole = fastest_pole(compiled.fixed_step.rhs, x, u, problem.parameters)
+    pole = fastest_pole(compiled.fixed_step.rhs, x, u, problem.numbers)
     period = 0.05
     coarsest = int(np.ceil(pole * period / 0.3))
     ends = []
     for k in range(5):
         result = compiled.fixed_step.advance(
-            x, np.zeros(ENERGIES.size), u[None, :], problem.parameters, period, coarsest * 2**k
+            x, np.zeros(compiled.loop.energies.size), u[None, :], problem.numbers, period, coarsest * 2**k
         )
         ends.append(np.concatenate([result.states[-1], result.quads[-1]]))
     n = problem.law.robot.n
@@ -95,7 +95,7 @@ def test_runge_kutta_and_cvodes_agree() -> None:
     that is let loose as here, and 1/600 of that of its position. A fifth of the step leaves 5⁻⁴ = 1/625.
     """
     problem, compiled, x, u = loop()
-    p = problem.parameters
+    p = problem.numbers
     pole = fastest_pole(compiled.fixed_step.rhs, x, u, p)
     assert pole < SLOW_POLE
     instants = np.array([0.0137, 0.02, 0.03, 0.04, 0.0501, 0.33, 0.777])
@@ -124,7 +124,7 @@ def test_instants_do_not_change_the_motion(gaps: list[float], repeats: int) -> N
     some 100 W/s, misses h² · 100 W/s = 4e-6 J of the tank's energy on top.
     """
     problem, compiled, x, u = loop()
-    p = problem.parameters
+    p = problem.numbers
     instants = np.cumsum(np.repeat(gaps, repeats))
     pole = 3 * fastest_pole(compiled.fixed_step.rhs, x, u, p)
     many = resolved_stretch(compiled.fixed_step, x, u, p, instants, pole)
@@ -235,7 +235,7 @@ def test_noise_has_its_variance_at_the_motors() -> None:
     u = layout.pack(motion | {"F_e": np.zeros(6), "torque_noise": np.zeros(2)})
     for i in np.flatnonzero(moving)[:-1]:
         x = compiled.loop.state.pack({f.name: run[f.name][i] for f in compiled.loop.state})
-        clean.append(compiled.outputs(x, u, problem.parameters)[compiled.loop.output_layout.slices["tau_m"]])
+        clean.append(compiled.outputs(x, u, problem.numbers)[compiled.loop.output_layout.slices["tau_m"]])
     noise = run["tau_m"][moving][:-1] - np.array(clean)
     assert noise.var() == pytest.approx(0.2, rel=0.29)
     assert abs(noise.mean()) < 5 * np.sqrt(0.2 / noise.size)
@@ -263,6 +263,6 @@ def test_a_run_that_diverges_ends_there_and_says_so() -> None:
     held = np.tile(u, (400, 1))
     held[:, compiled.loop.inputs.slices["torque_noise"]] = 1e200
     rows = np.arange(1, 401)
-    stretch = held_stretch(compiled.fixed_step, x, held, problem.parameters, 1e-3, rows)
+    stretch = held_stretch(compiled.fixed_step, x, held, problem.numbers, 1e-3, rows)
     assert "left the finite numbers" in stretch.failure
     assert np.isnan(stretch.states[-1]).all()

@@ -92,8 +92,8 @@ def test_the_cause_is_named_and_each_remedy_helps(name: str) -> None:
     assert len(str(advice).splitlines()) == 3
     for remedy in advice.remedies:
         if remedy.entry:
-            text = rewritten(problem.configuration, remedy.entry)
-            assert text != rewritten(problem.configuration, {})
+            text = rewritten(problem.text, remedy.entry)
+            assert text != rewritten(problem.text, {})
             assert holds(resolve(parse_scenario(text)))
     assert advice.remedies
     assert (

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from functools import lru_cache
 
 import casadi as cs
@@ -12,6 +11,7 @@ import scipy.linalg
 import yaml
 
 from passiflex.errors import ValueRangeError
+from passiflex.problems.problem import SampledProblem
 from passiflex.robots import FlexibleJointRobot
 from passiflex.robots.arm import SerialArm
 from passiflex.robots.chain import Body, Joint, SerialChain
@@ -125,8 +125,8 @@ def test_the_matrix_is_the_derivative_of_the_loop_itself(control: dict[str, obje
     """
     p = planar(control)
     loop, periods = LinearLoop(p), 4
-    assert p.sampling is not None
-    s, held = p.sampling, loop.compiled.held
+    assert isinstance(p, SampledProblem)
+    s, held = p, loop.compiled.held
     at_rest = loop_at_rest(p, loop.compiled.loop, p.law.layout.unpack(p.gains), s.period)
     timing = np.tile([s.delay, 1.0], (periods + 1, 1))
     longest = longest_step(p, loop.compiled.plant) / 16
@@ -255,7 +255,7 @@ def test_limits_resolution_and_friction_are_left_out() -> None:
 
 def test_a_problem_in_continuous_time_has_no_such_matrix() -> None:
     with pytest.raises(ValueRangeError, match="has no control rate"):
-        LinearLoop(dataclasses.replace(planar({}), sampling=None))
+        LinearLoop(resolve(world(control=None, tank=None)))
 
 
 @pytest.mark.parametrize("inner", ["plain", "matched"])
@@ -263,7 +263,7 @@ def test_nothing_else_that_is_remembered_acts_back(inner: str) -> None:
     """While the tank is full: a new memory that acts on the command must say so."""
     problem = resolve(world(control={"inner_loop": inner, "external_torque": "observer", "delay": PERIOD}))
     loop = LinearLoop(problem)
-    gains = loop.parts.gains.unpack(problem.gains)
+    gains = loop.parts["gains"].unpack(problem.gains)
     memory, row, _ = loop_at_rest(problem, loop.compiled.loop, gains, PERIOD)
     layout, control = loop.compiled.loop.memory, loop.compiled.control
     _, command, _ = control(loop.x, memory, row, loop.law.numbers)

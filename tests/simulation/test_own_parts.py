@@ -17,9 +17,9 @@ from passiflex.control.gravity import AbstractGravity, RobotGravity
 from passiflex.control.law import AbstractLaw, Array, ImpedanceLaw
 from passiflex.control.signals import Command, Measurement, Reference, Stored
 from passiflex.control.task import AbstractTask
+from passiflex.elements import AbstractElement, Effect, Touch, nothing
 from passiflex.errors import ArgumentError, NameUnknownError, SizeError, ValueRangeError
 from passiflex.layout import Field, Layout
-from passiflex.loops.elements import AbstractElement, Effect, Touch, nothing
 from passiflex.problems.own_parts import with_parts
 from passiflex.robots.flexible import FlexibleJointRobot
 from passiflex.sampled.tank import AbstractTank, PeriodFlows
@@ -47,12 +47,6 @@ class Brush(AbstractElement):
     """A drag along the motion of the end effector that grows with its speed."""
 
     strength: float
-
-    def parameters(self, n: int) -> Layout:
-        return Layout(())
-
-    def inputs(self) -> Layout:
-        return Layout(())
 
     def act(self, at: Touch, s: SimpleNamespace, m: SimpleNamespace) -> Effect:
         drag = self.strength * cs.norm_2(cs.vertcat(at.velocity, 1e-6)) * at.velocity
@@ -142,14 +136,19 @@ def test_what_does_not_fit_is_said() -> None:
     still = resolve(world(control=None, tank=None, noise=None))
 
     @dataclass(frozen=True)
-    class Numbered(Brush):
-        def parameters(self, n: int) -> Layout:
+    class Scheduled(Brush):
+        def inputs(self) -> Layout:
             return Layout((Field("bristles", (), "1"),))
 
     @dataclass(frozen=True)
-    class OnMotors(Brush):
+    class Stray(Brush):
         def act(self, at: Touch, s: SimpleNamespace, m: SimpleNamespace) -> Effect:
             return nothing(at.x.q.numel())._replace(motor=-at.x.dtheta, lost=cs.sumsqr(at.x.dtheta))
+
+    @dataclass(frozen=True)
+    class Hoard(Brush):
+        def act(self, at: Touch, s: SimpleNamespace, m: SimpleNamespace) -> Effect:
+            return nothing(at.x.q.numel())._replace(stored=cs.sumsqr(at.position))
 
     matched = resolve(world(control={"inner_loop": "matched"}))
     for wrong, error, message in (
@@ -167,12 +166,22 @@ def test_what_does_not_fit_is_said() -> None:
         (lambda: with_parts(problem, law=braked(), gains={"brak": 1.0}), NameUnknownError, "try 'brake'"),
         (lambda: with_parts(problem, gains={"brake": 1.0}), ValueRangeError, "a law of one's own; got brake"),
         (
-            lambda: with_parts(problem, elements=[Numbered(1.0)]),
+            lambda: with_parts(problem, elements=[Scheduled(1.0)]),
             ValueRangeError,
-            "has parameters; got Numbered",
+            "has inputs; got Scheduled",
         ),
-        (lambda: with_parts(problem, elements=[OnMotors(1.0)]), ValueRangeError, "the motors; got OnMotors"),
-        (lambda: with_parts(still, tank=Leaking()), ValueRangeError, "are for sampled loops"),
+        (
+            lambda: with_parts(problem, elements=[Stray(1.0)]),
+            ValueRangeError,
+            "more than the end effector; got Stray",
+        ),
+        (lambda: with_parts(problem, elements=[Hoard(1.0)]), ValueRangeError, "needs stores = True"),
+        (
+            lambda: with_parts(problem, elements=[Brush(1.0)] * 2),
+            ValueRangeError,
+            "two .* one name; got brush",
+        ),
+        (lambda: with_parts(still, tank=Leaking()), ValueRangeError, "is for sampled loops"),
     ):
         with pytest.raises(error, match=message):
             wrong()

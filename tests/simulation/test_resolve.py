@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from passiflex.control.law import ImpedanceLaw
 from passiflex.control.motion import pose_at
 from passiflex.control.rigid import RigidImpedanceLaw
-from passiflex.control.tank import NO_CAP, EnergyTank
+from passiflex.control.tank import NO_CAP
 from passiflex.errors import NameUnknownError, PassiflexError, ScenarioError, SizeError, ValueRangeError
 from passiflex.problems.gains import target_inertia
 from passiflex.problems.posture import natural_inertia, posture
@@ -309,7 +309,7 @@ def accelerations(p: Problem) -> tuple[np.ndarray, np.ndarray]:
     motion = p.events[0].motion
     assert motion is not None
     u = loop.inputs.pack({**motion, "F_e": p.events[0].F_e, "torque_noise": np.zeros(n)})
-    rate = loop.state.unpack(np.array(loop.rhs(x, u, p.parameters)[0]).ravel())
+    rate = loop.state.unpack(np.array(loop.rhs(x, u, p.numbers)[0]).ravel())
     return rate["dq"], rate["dtheta"]
 
 
@@ -454,7 +454,7 @@ def test_a_robot_in_its_place() -> None:
 def test_the_tank_is_that_of_the_scenario() -> None:
     p = problem(tank={"initial": 3, "floor": 0.1, "low": 0.2, "cap": 5, "fill": 0.5, "accounting": "signed"})
     assert p.tank == (3, 0.1, 5, True)
-    numbers = EnergyTank().layout.unpack(p.tank_gains)
+    numbers = p.parts.unpack("tank", p.numbers)
     assert {k: float(v) for k, v in numbers.items()} == {
         "tank_fill": 0.5,
         "tank_floor": 0.1,
@@ -463,7 +463,7 @@ def test_the_tank_is_that_of_the_scenario() -> None:
         "tank_band": 0.05,
         "tank_signed": 1,
     }
-    assert float(EnergyTank().layout.unpack(problem().tank_gains)["tank_cap"]) == NO_CAP
+    assert float(problem().parts.unpack("tank", problem().numbers)["tank_cap"]) == NO_CAP
 
 
 def test_static_gravity_refuses_joints_that_are_too_soft_for_its_fixed_point() -> None:

@@ -10,7 +10,7 @@ import pytest
 
 from passiflex.loops.compiled import compiled_sampled_loop
 from passiflex.passivity import Balance, link_balance, robot_balance
-from passiflex.problems.problem import Problem
+from passiflex.problems.problem import Problem, SampledProblem
 from passiflex.simulation import Run, resolve, simulate_problem, simulate_sampled
 from worlds import PERIOD, books, ran, same, world
 
@@ -65,8 +65,8 @@ ROUGH: dict[str, Any] = {
 def with_steps(problem: Problem, count: int, monkeypatch: pytest.MonkeyPatch) -> Run:
     """Return the run with `count` steps of the plant in each period."""
     usual = simulate_sampled.RESOLVED
-    assert problem.sampling is not None
-    plant = compiled_sampled_loop(problem.sampling.loop).plant
+    assert isinstance(problem, SampledProblem)
+    plant = compiled_sampled_loop(problem.loop).plant
     longest = simulate_sampled.longest_step(problem, plant)
     with monkeypatch.context() as m:
         m.setattr(simulate_sampled, "RESOLVED", usual * PERIOD / count / longest * (1 + 1e-9))

@@ -11,6 +11,7 @@ import pytest
 from passiflex.loops.compiled import compiled_sampled_loop
 from passiflex.loops.recorded import sample_parts
 from passiflex.loops.sampled_loop import SampledLoop
+from passiflex.problems.problem import SampledProblem
 from passiflex.robots.arm import SerialArm
 from passiflex.simulation import ClosedLoop, resolve
 from passiflex.simulation.schedule import PeriodRows
@@ -31,8 +32,8 @@ ACTING: dict[str, Any] = {
 def told(*chunks: int, **changes: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the periods' noise, timing with the time since the last one that ran, and rows; made in such chunks."""
     problem = resolve(world(**NOISE | changes))
-    assert problem.sampling is not None
-    compiled = compiled_sampled_loop(problem.sampling.loop)
+    assert isinstance(problem, SampledProblem)
+    compiled = compiled_sampled_loop(problem.loop)
     rows, first = PeriodRows(problem, compiled.loop.period, compiled.row), 0
     said, timing, at = [], [], compiled.loop.row.slices
     for count in chunks:
@@ -103,7 +104,7 @@ def test_elapsed_counts_the_missed_periods() -> None:
 def test_each_thing_is_said_in_its_own_periods() -> None:
     """From its first instant on, and not at its last; overlapping drags add up."""
     _, _, rows = told(500, **ACTING)
-    at = where()
+    at = where(**ACTING)
     time = np.arange(500) * PERIOD
     viscous = np.where((time >= 0.1), 5.0, 0.0) + np.where((time >= 0.2) & (time < 0.3), 2.0, 0.0)
     np.testing.assert_array_equal(rows[:, at["viscous_drag"]].ravel(), viscous)
@@ -117,7 +118,7 @@ def test_each_thing_is_said_in_its_own_periods() -> None:
 def test_the_reference_and_its_derivatives_agree() -> None:
     """On the circle: the velocity is the slope of the position, the acceleration that of the velocity, to h²."""
     _, _, rows = told(500, **ACTING)
-    at, turning = where(), slice(201, 500)
+    at, turning = where(**ACTING), slice(201, 500)
     position, velocity, acceleration = (
         rows[turning, at[f"desired_{name}"]][:, :3] for name in ("position", "velocity", "acceleration")
     )
@@ -129,24 +130,24 @@ def test_the_reference_and_its_derivatives_agree() -> None:
     np.testing.assert_array_equal(before, 0)
 
 
-def where() -> dict[str, slice]:
+def where(**changes: Any) -> dict[str, slice]:
     """Return where each thing is said."""
-    problem = resolve(world())
-    assert problem.sampling is not None
-    return compiled_sampled_loop(problem.sampling.loop).loop.row.slices
+    problem = resolve(world(**changes))
+    assert isinstance(problem, SampledProblem)
+    return compiled_sampled_loop(problem.loop).loop.row.slices
 
 
 def test_a_sampled_run_has_the_units_of_its_joints() -> None:
     """As a run in continuous time has them: a sliding joint has m, m/s and N."""
-    sampling = resolve(world()).sampling
-    assert sampling is not None
-    law, robot = sampling.controller.law, sampling.controller.law.robot
+    sampled = resolve(world())
+    assert isinstance(sampled, SampledProblem)
+    law, robot = sampled.controller.law, sampled.controller.law.robot
     first, *others = robot.arm.chain.joints
     chain = replace(robot.arm.chain, joints=(first._replace(kind="prismatic"), *others))
     law = replace(law, robot=replace(robot, arm=SerialArm(chain)))
     closed = ClosedLoop(law)
     wanted = {f.name: f.unit for f in closed.state + closed.output_layout}
-    parts = sample_parts(SampledLoop(replace(sampling.controller, law=law)))
+    parts = sample_parts(SampledLoop(replace(sampled.controller, law=law)))
     found = {f.name: f.unit for layout in parts.values() for f in layout}
     shared = wanted.keys() & found.keys()
     assert {"q", "theta", "dq", "dtheta", "tau_m", "tau_a", "tau_e", "tau_u", "phi", "dphi"} <= shared

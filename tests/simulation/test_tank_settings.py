@@ -58,11 +58,9 @@ def named_in_the_code(kind: str) -> set[str]:
     controller = SampledController(
         ImpedanceLaw(FlexibleJointRobot.load("planar2r"), PositionTask()), TANKS[kind]()
     )
-    n, views, tank = 2, [], None
-    for layout, name in zip(controller.parameters, ControlParameters._fields, strict=True):
-        vector, view = layout.symbols(name)
-        views.append(view)
-        tank = vector if name == "tank" else tank
+    n, parts = 2, controller.parameters
+    vectors = {part: cs.SX.sym(part, layout.size) for part, layout in parts.layouts.items()}
+    views, tank = parts.view(cs.vertcat(*vectors.values())), vectors["tank"]
     pose = EndEffectorPose(cs.SX.sym("p", 3), cs.SX.sym("R", 3, 3))
     sizes = {"q": n, "theta": n, "dq": n, "dtheta": n, "tau_a": n, "tau_e": n, "F_e": 6}
     y = Measurement(**{k: cs.SX.sym(k, size) for k, size in sizes.items()})
@@ -75,7 +73,7 @@ def named_in_the_code(kind: str) -> set[str]:
         cs.SX.sym("w", 6),
     )
     state = cs.SX.sym("s", controller.state.size)
-    step = controller.step(y, setpoint, cs.SX.sym("dt"), cs.SX.sym("u", n), state, ControlParameters(*views))
+    step = controller.step(y, setpoint, cs.SX.sym("dt"), cs.SX.sym("u", n), state, ControlParameters(**views))
     everything = cs.vertcat(step.command.tau_m, step.state, step.entry.valve)
     used = cs.which_depends(everything, tank, 1, False)
     names = [f.name.removeprefix("tank_") for f in controller.tank.layout for _ in range(f.size)]

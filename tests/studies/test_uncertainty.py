@@ -13,6 +13,7 @@ from passiflex.control.law import ImpedanceLaw
 from passiflex.control.rigid import RigidImpedanceLaw
 from passiflex.limits.workspace import REGULAR
 from passiflex.problems.posture import posture
+from passiflex.problems.problem import SampledProblem
 from passiflex.simulation import resolve
 from passiflex.studies.reproduce import reproduce
 from passiflex.studies.uncertainty import (
@@ -59,7 +60,7 @@ def test_what_is_believed_and_what_is_true() -> None:
         ratio = plant["joint_stiffness"] / model["joint_stiffness"] - 1
         assert 0 < np.abs(ratio).max() <= SPREAD
         assert isinstance(law, RigidImpedanceLaw if way == "sampled_baseline" else ImpedanceLaw)
-        assert (problem.sampling is None) == (way == "continuous")
+        assert (not isinstance(problem, SampledProblem)) == (way == "continuous")
 
 
 def test_the_workspace_is_away_from_singular_postures() -> None:

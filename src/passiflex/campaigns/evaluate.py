@@ -29,7 +29,7 @@ from passiflex.errors import (
 )
 from passiflex.files import as_path
 from passiflex.passivity.ledger import Signals
-from passiflex.problems.problem import Problem
+from passiflex.problems.problem import Problem, SampledProblem
 from passiflex.responses.steps import displacement, step_window
 from passiflex.simulation import Run, Scenario, resolve, simulate_problem
 from passiflex.simulation.batch import digest_batch, simulate_in_lane
@@ -154,12 +154,12 @@ def replay(folder: str | Path, sample: int) -> Run:
 def run_sample(campaign: Campaign, sample: int) -> Run:
     """Return the full run of one sample."""
     problem = resolve(sample_scenario(campaign, sample))
-    return simulate_in_lane(problem) if problem.sampling else simulate_problem(problem)
+    return simulate_in_lane(problem) if isinstance(problem, SampledProblem) else simulate_problem(problem)
 
 
 def _digested(problems: Sequence[Problem], digest: Digest, *, threads: int = 1) -> list[dict[str, Any]]:
     """Return what `digest` makes of the number and the signals of each problem, side by side where they are sampled."""
-    sampled = [k for k, p in enumerate(problems) if p.sampling]
+    sampled = [k for k, p in enumerate(problems) if isinstance(p, SampledProblem)]
     done = dict(
         zip(
             sampled,

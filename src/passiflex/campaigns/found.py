@@ -15,7 +15,7 @@ from passiflex.campaigns.samples import Values
 from passiflex.errors import UnstableLoopError
 from passiflex.files import OutputError, read_json, read_regular, require_writable, whole_file
 from passiflex.origin import package_version, source_commit
-from passiflex.problems.problem import Problem
+from passiflex.problems.problem import Problem, SampledProblem
 from passiflex.scenarios.scenario import Scenario
 from passiflex.stability.admissible import require_stable
 
@@ -141,7 +141,7 @@ def case_scenario(scenario: Scenario, problem: Problem, rank: int) -> Scenario:
     robot = Path(scenario.robot)
     if robot.suffix in (".yaml", ".yml"):  # a file is looked for beside the scenario's
         changes["robot"] = str(robot.resolve())
-    if scenario.control is not None:
+    if scenario.control is not None and isinstance(problem, SampledProblem):
         try:
             require_stable(problem)
         except UnstableLoopError:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from passiflex.passivity import audit
 from passiflex.passivity.ledger import Signals
 from passiflex.problems.gains import target_inertia
-from passiflex.problems.problem import Problem
+from passiflex.problems.problem import Problem, SampledProblem
 from passiflex.responses.closed_form import ideal_displacement
 from passiflex.responses.metrics import rms
 from passiflex.responses.steps import StepWindow, displacement, step_numbers
@@ -150,7 +150,7 @@ def _response(problem: Problem, window: StepWindow | None, run: Signals) -> dict
     moved = displacement(run["position"])
     numbers = step_numbers(run.time, moved, _ideal(problem, len(run.time)), window)
     numbers["offset_before_step"] = abs(numbers["offset_before_step"])
-    changing = problem.sampling is not None and problem.sampling.gains
+    changing = isinstance(problem, SampledProblem) and problem.gain_changes
     return numbers | ({"rms_to_msd": math.nan} if changing else {})
 
 

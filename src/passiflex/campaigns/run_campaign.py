@@ -33,7 +33,8 @@ from passiflex.chunks.stored_rows import read_blocks, read_rows
 from passiflex.errors import ArgumentError, NameUnknownError, PassiflexError, ValueRangeError
 from passiflex.files import as_path
 from passiflex.native import find_compiler
-from passiflex.simulation import Problem, Run, resolve
+from passiflex.problems.problem import Problem, SampledProblem
+from passiflex.simulation import Run, resolve
 from passiflex.simulation.batch import lane_loop
 from passiflex.stability.admissible import require_stable
 from passiflex.texts.yaml_tree import read_back
@@ -191,7 +192,7 @@ def _is_run_of(path: Path, campaign: Campaign, sample: int) -> bool:
     except PassiflexError:
         return False
     wanted = resolve(sample_scenario(campaign, sample))
-    return run.name == wanted.name and run.data.attrs.get("configuration") == wanted.configuration
+    return run.name == wanted.name and run.data.attrs.get("configuration") == wanted.text
 
 
 def _run_file(folder: Path, sample: int) -> Path:
@@ -209,10 +210,11 @@ def _engine(workers: int | None, scheduler: str | None) -> Engine:
 def _ready(campaign: Campaign) -> str:
     """Return the robot's digest, after refusing an unstable loop and compiling the lanes once for all workers."""
     base = resolve(campaign.scenario)
-    if base.sampling is not None:
+    if isinstance(base, SampledProblem):
         require_stable(base)
         if find_compiler() is not None:  # without one the samples run one by one
-            lane_loop(_first(campaign) or base)
+            first = _first(campaign)
+            lane_loop(first if isinstance(first, SampledProblem) else base)
     return robot_digest(campaign)
 
 

@@ -14,6 +14,7 @@ from passiflex.limits.inertia_search import InertiaSearch, UnattainableError
 from passiflex.limits.margin_box import MarginBox
 from passiflex.limits.recommendation import Recommendation
 from passiflex.problems.altered import rewritten
+from passiflex.problems.problem import SampledProblem, require_sampled
 from passiflex.robots.flexible import FlexibleJointRobot
 from passiflex.simulation import parse_scenario, resolve
 from passiflex.stability.judgement import judge
@@ -47,10 +48,7 @@ class Attempt:
         shaping = {"shaped_stiffness": {"ratio": 1}, "shaped_inertia": {"ratio": 1}}
         control = {"inner_loop": inner, "external_torque": "none", "allow_unstable": False}
         text = rewritten(scenario, {"law": shaping, "control": control})
-        self.problems = tuple(
-            resolve(parse_scenario(rewritten(text, {"posture": q.tolist()}), "recommend"), robot)
-            for q in places
-        )
+        self.problems = tuple(_sampled(rewritten(text, {"posture": q.tolist()}), robot) for q in places)
 
     def begun(self, margin: float) -> InertiaSearch:
         """Return a search whose ratios hold on the members that mostly decide: less it cannot be.
@@ -93,15 +91,15 @@ class Attempt:
     def _refused(self, search: InertiaSearch, entry: Mapping[str, Any]) -> str:
         """Return what does not hold of gains that hold on the box, by the judge and by the nonlinear loop."""
         for problem in self.problems:
-            text = rewritten(problem.configuration, entry)
-            found = judge(resolve(parse_scenario(text, "recommend"), self.robot))
+            text = rewritten(problem.text, entry)
+            found = judge(_sampled(text, self.robot))
             if not found.stable:
                 return "missed periods" if found.missed else PARTS[found.part]
         member = search.worst.member
         box, (_, late) = search.box, search.box.loop(member)
         there = {**entry, "posture": box.angles(member).tolist()}
-        text = rewritten(self.problems[member.posture].configuration, there)
-        problem = resolve(parse_scenario(text, "recommend"), self.robot)
+        text = rewritten(self.problems[member.posture].text, there)
+        problem = _sampled(text, self.robot)
         return "" if settled(problem, box.plant(member), late, self.variance) else "simulation"
 
     def _entry(self, search: InertiaSearch) -> dict[str, Any]:
@@ -109,7 +107,7 @@ class Attempt:
         gains, box = search.gains(), search.box
         inertia = {"shaped_inertia": [float(v) for v in gains["shaped_inertia"]]}
         own = {"shaped_stiffness": {"ratio": 1}} | inertia
-        data = read_back(rewritten(self.problems[0].configuration, {"law": own}))
+        data = read_back(rewritten(self.problems[0].text, {"law": own}))
         back = gains | {"shaped_inertia": self.robot.motor_inertia}
         suspects = [*box.centres(), *search.active, search.worst.member]
         if not all(box.radius(m, back) < 1 for m in suspects):
@@ -122,8 +120,7 @@ class Attempt:
 
     def _recommendation(self, search: InertiaSearch, entry: Mapping[str, Any]) -> Recommendation:
         gains, box, worst = search.gains(), search.box, search.worst
-        s = self.problems[0].sampling
-        assert s is not None
+        s = self.problems[0]
         return Recommendation(
             robot=self.robot.name,
             rate=1 / s.period,
@@ -142,3 +139,7 @@ class Attempt:
             decided_by=tuple(search.decided),
             entry=entry,
         )
+
+
+def _sampled(text: str, robot: FlexibleJointRobot) -> SampledProblem:
+    return require_sampled(resolve(parse_scenario(text, "recommend"), robot))

@@ -39,13 +39,13 @@ class Pairs(NamedTuple):
 def steepest(box: MarginBox, member: Member, gains: Gains, *, dominant: bool = False) -> list[Array]:
     """Return ∂|λ|/∂off of the modes that could grow most within the box, or of those that are largest here."""
     loop, late = box.loop(member)
-    timing = Timing.of(loop.s.period, late, int(late / loop.s.period + 1e-9) + 1)
+    timing = Timing.of(loop.problem.period, late, int(late / loop.problem.period + 1e-9) + 1)
     flow, ran = loop.flow(timing), loop.runs(timing, gains)
     parts: Any = scipy.linalg.eig(flow @ ran, left=True, check_finite=False)
     values, left, right = parts
-    sizes = np.where(self_motion(values, right, loop.s.period, loop.task_jacobian), 0.0, np.abs(values))
+    sizes = np.where(self_motion(values, right, loop.problem.period, loop.task_jacobian), 0.0, np.abs(values))
     sizes = np.where(values.imag < 0, 0.0, sizes)  # of a pair one is enough
-    fast = trembles(values, loop.s.period)
+    fast = trembles(values, loop.problem.period)
     danger = np.where(fast | (sizes >= 1), sizes, 0.0)
     quick, slow = np.argsort(-danger), np.argsort(-np.where(fast, 0.0, sizes))
     chosen = quick[:DOMINANT] if dominant else np.concatenate([quick[:FOLLOWED], slow[:SLOW]])

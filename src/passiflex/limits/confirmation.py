@@ -12,10 +12,8 @@ from numpy.typing import NDArray
 
 from passiflex.control.motion import hold
 from passiflex.control.tank import NO_CAP
-from passiflex.errors import ValueRangeError
-from passiflex.problems.altered import altered, replaced
-from passiflex.problems.problem import Event, Noise
-from passiflex.simulation import Problem
+from passiflex.problems.altered import altered
+from passiflex.problems.problem import Event, Noise, Problem, SampledProblem, require_sampled
 from passiflex.simulation.simulate_sampled import simulate_unchecked
 from passiflex.stability.law_slope import IDEAL
 from passiflex.stability.linear_loop import LinearLoop
@@ -73,44 +71,32 @@ class Confirmation(NamedTuple):
 
 
 def confirm(
-    problem: Problem,
+    problem: SampledProblem,
     plane: str,
     point: tuple[float, float],
     gains: Mapping[str, Array] | None = None,
     rate: float | None = None,
 ) -> Confirmation:
     """Return both verdicts on the problem with these gains, at a rate with as many periods of delay."""
-    assert problem.sampling is not None
-    late = None if rate is None else problem.sampling.delay / problem.sampling.period / rate
+    late = None if rate is None else problem.delay / problem.period / rate
     changed = altered(problem, rate=rate, delay=late, gains=gains)
     return Confirmation(plane, *point, LinearLoop(changed).radius(), growth(disturbed(changed)))
 
 
-def disturbed(problem: Problem, periods: int = PERIODS) -> Problem:
+def disturbed(problem: Problem, periods: int = PERIODS) -> SampledProblem:
     """Return the problem at rest and pushed for `PUSHED` periods, with nothing that could hide a growing motion.
 
     No limits, resolution, friction, noise, lost or late periods; a tank that never runs empty.
     """
-    s = problem.sampling
-    if s is None:
-        raise ValueRangeError("the problem has no control rate", got=problem.name, needs="a sampled one")
-    parts = s.loop.parameters
+    s = require_sampled(problem)
     endless = {"tank_cap": NO_CAP, "tank_power": NO_CAP, "tank_trip": -NO_CAP}
-    numbers = replaced(parts, s.numbers, IDEAL | endless)
-    sampling = dataclasses.replace(
-        s,
+    return dataclasses.replace(
+        s.with_numbers(IDEAL | endless),
         jitter=0.0,
         missed=0.0,
         allow_unstable=True,
-        numbers=numbers,
-        plant=numbers[: parts.plant.size],
-        gains=(),
+        gain_changes=(),
         feedforward=(),
-        drags=(),
-    )
-    return dataclasses.replace(
-        problem,
-        sampling=sampling,
         noise=None,
         events=(Event(0.0, hold(problem.home), PUSH), Event(PUSHED * s.period, None, np.zeros(6))),
         duration=periods * s.period,
@@ -119,7 +105,7 @@ def disturbed(problem: Problem, periods: int = PERIODS) -> Problem:
     )
 
 
-def settled(problem: Problem, plant: Mapping[str, Array], late: float, variance: float) -> bool:
+def settled(problem: SampledProblem, plant: Mapping[str, Array], late: float, variance: float) -> bool:
     """Return whether a robot of a box comes to rest after a push, with its sensors, limits and noise.
 
     Nothing trembles on: over the last third of the run no motor's torque is off its rest by more than `CALM`
@@ -134,28 +120,25 @@ def settled(problem: Problem, plant: Mapping[str, Array], late: float, variance:
     variance: Of the torque sensors' noise [(N m)²].
     """
     changed = altered(problem, plant=plant)
-    own, s = disturbed(changed), changed.sampling
-    assert s is not None
-    assert own.sampling is not None
-    robot = problem.law.robot
-    parts = s.loop.parameters
-    real = parts.unpack("sensors", s.numbers) | parts.unpack("limits", s.numbers)
+    own, robot = disturbed(changed), problem.law.robot
+    real = own.parts.unpack("sensors", changed.numbers) | own.parts.unpack("limits", changed.numbers)
     limit = np.minimum(np.asarray(real["torque_limit"]), robot.torque_limit)
-    numbers = replaced(parts, own.sampling.numbers, real | {"torque_limit": limit})
-    sampling = dataclasses.replace(own.sampling, delay=late, numbers=numbers)
-    noise = Noise(variance, s.period) if variance else None
-    run = simulate_unchecked(dataclasses.replace(own, sampling=sampling, noise=noise))
+    noise = Noise(variance, changed.period) if variance else None
+    own = dataclasses.replace(own.with_numbers(real | {"torque_limit": limit}), delay=late, noise=noise)
+    run = simulate_unchecked(own)
     if run.failure:
         return False
     third = len(run.time) // 3
-    off = np.abs(run["tau_m"] - s.held)
+    off = np.abs(run["tau_m"] - changed.held)
     middle, end = (np.sqrt(np.mean(part**2, axis=0)) for part in (off[third : 2 * third], off[2 * third :]))
     dies_out = variance > 0 or bool((end <= np.maximum(FADING * middle, QUIET * limit)).all())
-    near = np.abs(run["tau_m"][2 * third :]).max(axis=0) >= np.maximum(NEARLY * limit, 1.05 * np.abs(s.held))
+    near = np.abs(run["tau_m"][2 * third :]).max(axis=0) >= np.maximum(
+        NEARLY * limit, 1.05 * np.abs(changed.held)
+    )
     return dies_out and bool((end <= CALM * limit).all()) and not near.any()
 
 
-def growth(problem: Problem) -> float:
+def growth(problem: SampledProblem) -> float:
     """Return by how much the motion of a disturbed problem grows: inf if it left the finite numbers.
 
     The motion is the second difference of the motor velocities over the samples, in which the slow sway

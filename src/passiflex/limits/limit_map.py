@@ -145,8 +145,7 @@ def limit_map(
         If there is no rate, rate or delay make no sense, or the scenario does not fit its robot.
     """
     problem = sampled_problem(subject, rate, delay, task=task, inner_loop=inner_loop)
-    assert problem.sampling is not None
-    name, period = problem.name, problem.sampling.period
+    name, period = problem.name, problem.period
     report(f"{name}: compiling")
     own = LinearLoop(problem)
     shaped = problem.law.shapes
@@ -156,7 +155,7 @@ def limit_map(
     planes = shaping_plane(own, grids.stiffness_ratios, grids.inertia_ratios) if shaped else None
     impedance = impedance_plane(own, grids.stiffness_scales, grids.damping_scales)
     compared = PERIODS if pictured else ()  # a matched loop is built anew for each delay
-    delays = np.unique(np.round([*compared, problem.sampling.delay / period], 9))
+    delays = np.unique(np.round([*compared, problem.delay / period], 9))
     report(f"{name}: borders at other delays and rates")
     loops = [LinearLoop(altered(problem, delay=d * period)) for d in delays] if pictured else [own]
     found = LimitMap(

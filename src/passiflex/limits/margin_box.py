@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 
 from passiflex.errors import ValueRangeError
 from passiflex.limits.box_slopes import steepest
+from passiflex.problems.problem import SampledProblem
 from passiflex.problems.resolution import SCALED
-from passiflex.simulation import Problem
 from passiflex.stability.linear_loop import LinearLoop
 from passiflex.stability.loop_at_rest import standing
 
@@ -77,7 +77,7 @@ class MarginBox:
         delay may.
     """
 
-    problems: tuple[Problem, ...]
+    problems: tuple[SampledProblem, ...]
     margin: float
     _nominal: dict[int, LinearLoop] = field(default_factory=dict)
     _loops: dict[Member, tuple[LinearLoop, float]] = field(default_factory=dict)
@@ -211,7 +211,7 @@ class MarginBox:
         low, high = problem.law.robot.position_limit.T
         return np.asarray(np.clip(problem.q + near, np.minimum(low, problem.q), np.maximum(high, problem.q)))
 
-    def _standing(self, problem: Problem, member: Member) -> LinearLoop:
+    def _standing(self, problem: SampledProblem, member: Member) -> LinearLoop:
         off = np.array(member.off)
         moved = bool(off[4 * self.n + 1 :].any())
         at = standing(problem, self.angles(member), self.plant(member))
@@ -221,8 +221,7 @@ class MarginBox:
 
     def late(self, member: Member) -> float:
         """Return the delay [s] of a member: the jitter and so many periods around it are part of the box."""
-        s, off = self.problems[0].sampling, member.off
-        assert s is not None
+        s, off = self.problems[0], member.off
         share, spread = off[4 * self.n], self.margin * s.period
         return max(s.delay + s.jitter * (1 + share) / 2 + spread * share, 0.0)
 

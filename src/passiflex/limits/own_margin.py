@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from passiflex.limits.margin_box import NEAR, MarginBox, Worst
-from passiflex.simulation import Problem
+from passiflex.problems.problem import SampledProblem
 
 MOST = 0.3
 """Largest margin that is looked for."""
@@ -39,7 +39,7 @@ class OwnMargin(NamedTuple):
         return f"margin: {off} may be off by {100 * self.share:.2g} %; beyond, {robot}"
 
 
-def own_margin(problem: Problem) -> OwnMargin:
+def own_margin(problem: SampledProblem) -> OwnMargin:
     """Return the margin of a problem's own gains; 0 if the robot itself does not hold.
 
     By halving with quick searches of the box, then downward in steps until a thorough one finds nothing.
@@ -62,7 +62,7 @@ def own_margin(problem: Problem) -> OwnMargin:
     return OwnMargin(low, corner if low < MOST else "")
 
 
-def _worst(problem: Problem, share: float, *, thorough: bool) -> tuple[Worst, str]:
+def _worst(problem: SampledProblem, share: float, *, thorough: bool) -> tuple[Worst, str]:
     box = MarginBox((problem,), share)
     worst = box.search({}, 0, thorough=thorough)
     return worst, box.words(worst.member)

@@ -73,19 +73,19 @@ def stable_damping(loop: LinearLoop, plane: Plane) -> StableRange:
 
 def least_inertias(loop: LinearLoop, stiffness_ratios: Array) -> Array:
     """Return the smallest stable B_e/B at each K_e/K (a,), as `least_inertia` has it."""
-    T, late = loop.s.period, loop.s.delay
+    T, late = loop.problem.period, loop.problem.delay
     return np.array([least_inertia(loop, float(r), T, late, SCAN, FINE) for r in stiffness_ratios])
 
 
 def least_inertias_by_rate(loop: LinearLoop, rates: Iterable[float]) -> Array:
     """Return the smallest stable B_e/B with K_e = K at each rate [Hz], with as many periods of delay."""
-    periods = loop.s.delay / loop.s.period
+    periods = loop.problem.delay / loop.problem.period
     return np.array([least_inertia(loop, 1.0, 1 / r, periods / r, SCAN, FINE) for r in rates])
 
 
 def radii_by_rate(loop: LinearLoop, rates: Iterable[float]) -> Array:
     """Return the radius of the problem's own gains at each rate [Hz], with as many periods of delay."""
-    periods = loop.s.delay / loop.s.period
+    periods = loop.problem.delay / loop.problem.period
     return np.array([loop.radius(1 / r, periods / r) for r in rates])
 
 

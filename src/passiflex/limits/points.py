@@ -63,13 +63,13 @@ def _both_sides(
     own: LinearLoop, place: Callable[[float], Point], border: float, *, largest: bool = False
 ) -> Iterator[Point]:
     """Yield the point outside a border, if one there is seen to grow, and the one inside."""
-    periods = own.s.delay / own.s.period
+    periods = own.problem.delay / own.problem.period
 
     def beside(side: float) -> Point:
         return place(float(border / side if largest else border * side))
 
     for outside in map(beside, OUTSIDE):
-        T = own.s.period if outside.rate is None else 1 / outside.rate
+        T = own.problem.period if outside.rate is None else 1 / outside.rate
         if own.radius(T, periods * T, outside.gains) >= VISIBLE:
             yield outside
             break
@@ -91,5 +91,5 @@ def _sampled(own: LinearLoop, rate: float, inertia_ratio: float) -> Point:
 
 
 def _faster(own: LinearLoop, rate: float) -> Point:
-    periods = own.s.delay / own.s.period
+    periods = own.problem.delay / own.problem.period
     return Point("rate", (rate, own.radius(1 / rate, periods / rate)), {}, rate)

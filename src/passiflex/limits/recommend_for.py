@@ -48,7 +48,7 @@ def recommend_for(
         )
     gains = law.layout.unpack(problem.gains)
     written = {name: {"matrix": gains[name].tolist()} for name in ("stiffness", "damping")}
-    text = rewritten(problem.configuration, {"law": written})
+    text = rewritten(problem.text, {"law": written})
     return recommend_gains(
         text,
         law.robot,

@@ -8,6 +8,7 @@ from typing import Any
 
 from passiflex.errors import ValueRangeError
 from passiflex.problems.altered import HIGHEST_RATE, altered, at_rate
+from passiflex.problems.problem import SampledProblem, require_sampled
 from passiflex.scenarios.scenario_file import as_scenario
 from passiflex.simulation import Problem, Scenario, parse_scenario, resolve
 from passiflex.texts.quantity import Quantity, shown
@@ -28,7 +29,7 @@ def sampled_problem(
     *,
     task: str | None = None,
     inner_loop: str | None = None,
-) -> Problem:
+) -> SampledProblem:
     """Return the problem at a rate [Hz] and delay [s], its own unless given; text may name a unit, as "1 kHz".
 
     A scenario or problem in continuous time becomes a sampled one, with the plain inner loop unless another is given.
@@ -44,17 +45,17 @@ def sampled_problem(
     late = None if delay is None else number("delay", delay, DELAY)
     robot = None
     if isinstance(subject, Problem):
-        if subject.sampling is not None and task is None and inner_loop is None:
+        if isinstance(subject, SampledProblem) and task is None and inner_loop is None:
             return altered(subject, rate=hertz, delay=late)
         robot = subject.law.robot
-        subject = parse_scenario(subject.configuration)
+        subject = parse_scenario(subject.text)
     scenario = as_scenario(subject)
     if task is not None:
         scenario = with_task(scenario, task)
     scenario = at_rate(scenario, hertz, late)
     if inner_loop is not None:
         scenario = scenario.changed({"control.inner_loop": inner_loop})
-    return resolve(scenario, robot)
+    return require_sampled(resolve(scenario, robot))
 
 
 def with_task(scenario: Scenario, task: str) -> Scenario:

@@ -33,10 +33,10 @@ def torque_by_noise(
     kept = coupled(driven.A).kept
     tight = DrivenLoop(driven.A[np.ix_(kept, kept)], driven.G[kept], driven.C[:, kept], driven.D)
     values = np.linalg.eigvals(tight.A)
-    drift = drift_of(tight.A, values, loop.s.period, loop.task_jacobian)
+    drift = drift_of(tight.A, values, loop.problem.period, loop.task_jacobian)
     if np.abs(values[~drift]).max(initial=0.0) >= 1:
         return np.full(len(driven.C), np.inf)
-    return rms_torque(quick(tight, loop.s.period), variance, values[drift])
+    return rms_torque(quick(tight, loop.problem.period), variance, values[drift])
 
 
 def quick(loop: DrivenLoop, period: float) -> DrivenLoop:

@@ -11,16 +11,15 @@ import casadi as cs
 
 from passiflex.control.law import AbstractLaw
 from passiflex.control.motion import MOTION, reference_at
-from passiflex.control.signals import Command, Measurement
+from passiflex.control.signals import Command, Measurement, Reference
 from passiflex.control.tank import EnergyTank
-from passiflex.layout import Field, Layout
-from passiflex.loops.plant import PORTS, Plant
+from passiflex.layout import Field, Layout, Signal
+from passiflex.loops.plant import Elements, Plant
 from passiflex.loops.witness import Instant, Witness
-from passiflex.robots.flexible import RobotState
+from passiflex.parts import Parts
 
-ENERGIES = Layout(
+OF_THE_LAW = Layout(
     (
-        *PORTS,
         Field("joint_damping", (), "J", "claimed by the law: lost in D_e"),
         Field("cartesian_damping", (), "J", "claimed by the law: lost in D_x"),
         Field("null_space_damping", (), "J", "claimed by the law: lost in D_ns"),
@@ -29,6 +28,7 @@ ENERGIES = Layout(
         Field("spilled", (), "J", "part of P_D that the tank did not take"),
     )
 )
+"""What passes within a law in continuous time, by its own claims."""
 
 
 class _Signals(NamedTuple):
@@ -36,7 +36,7 @@ class _Signals(NamedTuple):
 
     derivative: cs.SX
     powers: cs.SX
-    outputs: cs.SX
+    outputs: tuple[Signal, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,12 +50,18 @@ class ClosedLoop:
     """
 
     law: AbstractLaw
+    elements: Elements = ()
     tank: EnergyTank = EnergyTank()
 
     @cached_property
     def plant(self) -> Plant:
-        """Return the plant, which nothing but a wrench touches."""
-        return Plant(self.law.robot, ())
+        """Return the plant."""
+        return Plant(self.law.robot, self.elements)
+
+    @cached_property
+    def energies(self) -> Layout:
+        """Return what is summed up over time."""
+        return self.plant.energies + OF_THE_LAW
 
     @cached_property
     def state(self) -> Layout:
@@ -70,126 +76,97 @@ class ClosedLoop:
     def inputs(self) -> Layout:
         """Return what is constant between two events."""
         n, (_, _, torque) = self.law.robot.n, self.law.robot.arm.chain.joint_units
-        return MOTION + Layout(
-            (
-                Field("F_e", (6,), "N, N m", "wrench on the end effector, world axes"),
-                Field("torque_noise", (n,), torque, "added to the measured τ_a"),
-            )
-        )
+        noise = Field("torque_noise", (n,), torque, "added to the measured τ_a")
+        return MOTION + self.plant.environment + Layout((noise,))
 
     @cached_property
-    def parameters(self) -> tuple[Layout, Layout, Layout, Layout]:
-        """Return the layouts of plant, law's model, gains and tank, in this order."""
-        return self.plant.parameters, self.law.robot.layout, self.law.layout, self.tank.layout
+    def parameters(self) -> Parts:
+        """Return the layouts of plant, law's model, gains and tank."""
+        model, gains = self.law.robot.layout, self.law.layout
+        return Parts(
+            {"plant": self.plant.parameters, "model": model, "gains": gains, "tank": self.tank.layout}
+        )
 
     @cached_property
     def output_layout(self) -> Layout:
         """Return the recorded signals."""
-        n, (angle, speed, torque) = self.law.robot.n, self.law.robot.arm.chain.joint_units
-        claimed = "claimed by the law"
-        return Layout(
-            (
-                Field("position", (3,), "m", "end effector", axes=("axis",)),
-                Field("rotation", (3, 3), "1", "axes of the end effector", axes=("axis", "column")),
-                Field("desired_position", (3,), "m", "reference x_d", axes=("axis",)),
-                Field("desired_rotation", (3, 3), "1", "axes of the reference", axes=("axis", "column")),
-                Field("phi", (n,), angle, "shaped motor coordinate of (11)"),
-                Field("dphi", (n,), speed, "its velocity"),
-                Field("tau_m", (n,), torque, "motor torque"),
-                Field("tau_a", (n,), torque, "torque through the joint, positive on the link"),
-                Field("tau_e", (n,), torque, "external joint torque"),
-                Field("tau_u", (n,), torque, "outer-loop torque"),
-                Field("wrench", (6,), "N, N m", "F_e on the end effector", axes=("component",)),
-                Field("link_kinetic_energy", (), "J", "½ q̇ᵀ M q̇"),
-                Field("motor_kinetic_energy", (), "J", "½ θ̇ᵀ B θ̇"),
-                Field("joint_spring_energy", (), "J", "½ (θ−q)ᵀ K (θ−q)"),
-                Field("potential_energy", (), "J", "V(q)"),
-                Field("compensated_energy", (), "J", f"V̂(q) of the law's model, {claimed}"),
-                Field("shaped_kinetic_energy", (), "J", f"½ φ̇ᵀ B_e φ̇, {claimed}"),
-                Field("shaped_spring_energy", (), "J", f"½ (φ−q)ᵀ K_e (φ−q), {claimed}"),
-                Field("cartesian_spring_energy", (), "J", f"U(φ; x_d), {claimed}"),
-                Field("gravity_storage", (), "J", f"of the gravity compensation, {claimed}"),
-                Field("fill", (), "1", "α"),
-                Field("valve", (), "1", "β"),
-            )
-        ) + Layout(tuple(Field(f"{f.name}_power", (), "W", f"rate of {f.name}_energy") for f in ENERGIES))
+        return Layout.of(self._signals.outputs)
 
     @cached_property
     def _vectors(self) -> tuple[cs.SX, cs.SX, cs.SX]:
-        size = sum(part.size for part in self.parameters)
-        return cs.SX.sym("x", self.state.size), cs.SX.sym("u", self.inputs.size), cs.SX.sym("p", size)
+        sizes = {"x": self.state.size, "u": self.inputs.size, "p": self.parameters.size}
+        x, u, p = (cs.SX.sym(name, size) for name, size in sizes.items())
+        return x, u, p
 
     def _views(self) -> tuple[SimpleNamespace, ...]:
         x, u, p = self._vectors
-        views, start = [self.state.view(x), self.inputs.view(u)], 0
-        for part in self.parameters:
-            views.append(part.view(p[start : start + part.size]))
-            start += part.size
-        return tuple(views)
+        return self.state.view(x), self.inputs.view(u), *self.parameters.view(p).values()
 
     @cached_property
     def _signals(self) -> _Signals:
         x, u, plant, model, gains, tank = self._views()
         arm = self.law.robot.arm
-        state = RobotState(x.q, x.theta, x.dq, x.dtheta)
+        state = self._vectors[0][: self.plant.state.size]
         valve = self.tank.valve(x.tank_energy, tank) if self.law.has_tank else cs.SX(1)
         reference = reference_at(x.clock, valve, u)
 
         true = self.plant.true(state, u, plant)
-        noisy = true["tau_a"] + u.torque_noise
-        measurement = Measurement(x.q, x.theta, x.dq, x.dtheta, noisy, u.F_e, true["tau_e"])
+        real = {signal.field.name: signal.value for signal in true}
+        measured = self.plant.view(state)
+        measurement = Measurement(*measured, real["tau_a"] + u.torque_noise, u.F_e, real["tau_e"])
         command: Command = self.law.command(measurement, reference, model, gains)
-        claim = command.energy
+        claim, has_tank = command.energy, self.law.has_tank
         tank_flow = self.tank.flow(x.tank_energy, claim.dissipated_power, claim.reference_power, tank)
         flow = self.plant.flow(state, command.tau_m, u, plant)
-
-        powers = ENERGIES.stack(
+        powers = self.energies.stack(
             {
                 **flow.powers,
                 "joint_damping": claim.joint_damping,
                 "cartesian_damping": claim.cartesian_damping,
                 "null_space_damping": claim.null_space_damping,
                 "reference": claim.reference_power,
-                "drawn": tank_flow.drawn if self.law.has_tank else 0,
-                "spilled": tank_flow.spilled if self.law.has_tank else claim.dissipated_power,
+                "drawn": tank_flow.drawn if has_tank else 0,
+                "spilled": tank_flow.spilled if has_tank else claim.dissipated_power,
             }
         )
-        derivative = self.state.stack(
-            {
-                "q": x.dq,
-                "theta": x.dtheta,
-                "dq": flow.ddq,
-                "dtheta": flow.ddtheta,
-                "tank_energy": tank_flow.rate if self.law.has_tank else 0,
-                "clock": valve,
-            }
+        own = {"tank_energy": tank_flow.rate if has_tank else 0, "clock": valve}
+        derivative = self.state.stack(flow.rate | own)
+        claims = self._claims(reference, command, arm.potential_energy(x.q, model))
+        rates = (
+            Signal(Field(f"{f.name}_power", (), "W", f"rate of {f.name}_energy"), power)
+            for f, power in zip(self.energies, cs.vertsplit(powers), strict=True)
         )
-        outputs = cs.vertcat(
-            Layout(self.output_layout.fields[: -len(ENERGIES.fields)]).stack(
-                {
-                    **true,
-                    "desired_position": reference.pose.position,
-                    "desired_rotation": reference.pose.rotation,
-                    "phi": command.phi,
-                    "dphi": command.dphi,
-                    "tau_m": command.tau_m,
-                    "tau_u": command.tau_u,
-                    "compensated_energy": arm.potential_energy(x.q, model),
-                    "shaped_kinetic_energy": claim.motor_kinetic,
-                    "shaped_spring_energy": claim.joint_spring,
-                    "cartesian_spring_energy": claim.cartesian_spring,
-                    "gravity_storage": claim.gravity_storage,
-                    "fill": tank_flow.fill,
-                    "valve": valve,
-                }
-            ),
-            powers,
+        tank_signals = (
+            Signal(Field("fill", (), "1", "α"), tank_flow.fill),
+            Signal(Field("valve", (), "1", "β"), valve),
         )
-        return _Signals(derivative, powers, outputs)
+        return _Signals(derivative, powers, (*_in_order(true, claims), *tank_signals, *rates))
+
+    def _claims(self, reference: Reference, command: Command, carried: cs.SX) -> tuple[Signal, ...]:
+        """Return what the law asks for, and what it claims."""
+        n, (angle, speed, torque) = self.law.robot.n, self.law.robot.arm.chain.joint_units
+        (position, rotation), claim, across = reference.pose, command.energy, ("axis", "column")
+
+        def claimed(name: str, what: str, value: cs.SX) -> Signal:
+            return Signal(Field(name, (), "J", f"{what}, claimed by the law"), value)
+
+        return (
+            Signal(Field("desired_position", (3,), "m", "reference x_d", axes=("axis",)), position),
+            Signal(Field("desired_rotation", (3, 3), "1", "axes of the reference", axes=across), rotation),
+            Signal(Field("phi", (n,), angle, "shaped motor coordinate of (11)"), command.phi),
+            Signal(Field("dphi", (n,), speed, "its velocity"), command.dphi),
+            Signal(Field("tau_m", (n,), torque, "motor torque"), command.tau_m),
+            Signal(Field("tau_u", (n,), torque, "outer-loop torque"), command.tau_u),
+            claimed("compensated_energy", "V̂(q) of the law's model", carried),
+            claimed("shaped_kinetic_energy", "½ φ̇ᵀ B_e φ̇", claim.motor_kinetic),
+            claimed("shaped_spring_energy", "½ (φ−q)ᵀ K_e (φ−q)", claim.joint_spring),
+            claimed("cartesian_spring_energy", "U(φ; x_d)", claim.cartesian_spring),
+            claimed("gravity_storage", "of the gravity compensation", claim.gravity_storage),
+        )
 
     @cached_property
     def rhs(self) -> cs.Function:
-        """Return (x, u, p) → (ẋ, powers): the vector field and the integrands of `ENERGIES`."""
+        """Return (x, u, p) → (ẋ, powers): the vector field and the integrands of `energies`."""
         s = self._signals
         return cs.Function(
             "rhs", list(self._vectors), [cs.densify(s.derivative), cs.densify(s.powers)], {"cse": True}
@@ -198,7 +175,12 @@ class ClosedLoop:
     @cached_property
     def outputs(self) -> cs.Function:
         """Return (x, u, p) → the signals of `output_layout`."""
-        return cs.Function("outputs", list(self._vectors), [cs.densify(self._signals.outputs)], {"cse": True})
+        return cs.Function(
+            "outputs",
+            list(self._vectors),
+            [cs.densify(self.output_layout.stack_of(self._signals.outputs))],
+            {"cse": True},
+        )
 
     @cached_property
     def witness(self) -> Witness:
@@ -211,7 +193,7 @@ class ClosedLoop:
         (x, u, p), law, witness = self._vectors, self.law, self.witness
         memory, w = witness.memory.symbols("w")
         time, p_watch = cs.SX.sym("time"), cs.SX.sym("p_watch", witness.parameters.size)
-        energies, passed = ENERGIES.symbols("energies")
+        energies, passed = self.energies.symbols("energies")
         s, inputs, plant, model, gains, tank = self._views()
         arm, zero = law.robot.arm, cs.SX.zeros(law.robot.n)
         stored = law.stored(
@@ -256,3 +238,8 @@ class ClosedLoop:
         command = self.law.command(y, reference_at(clock, cs.SX(1), c), m, g)
         arguments = [q, theta, dq, dtheta, tau_a, F_e, clock, motion, model, gains]
         return cs.Function("law", arguments, [cs.densify(command.tau_m)], {"cse": True})
+
+
+def _in_order(true: tuple[Signal, ...], claimed: tuple[Signal, ...]) -> tuple[Signal, ...]:
+    """Return the signals in the order in which files have them: the reference beside the end effector."""
+    return (*true[:2], *claimed[:5], *true[2:4], claimed[5], *true[4:], *claimed[6:])

@@ -8,7 +8,6 @@ from functools import lru_cache
 
 import casadi as cs
 
-from passiflex.control.law import AbstractLaw
 from passiflex.loops.closed_loop import ClosedLoop
 from passiflex.loops.plant import Elements
 from passiflex.loops.sampled_loop import SampledLoop
@@ -53,11 +52,11 @@ class CompiledLoop:
     law: NativeFunction
 
 
-def compiled_loop(law: AbstractLaw) -> CompiledLoop:
-    """Return the compiled closed loop of a law; from the process, the cache on disk, or compiled now."""
-    key = _urdf(law.robot.arm), law.structure
+def compiled_loop(loop: ClosedLoop) -> CompiledLoop:
+    """Return the compiled functions of a loop; from the process, the cache on disk, or compiled now."""
+    key = _urdf(loop.law.robot.arm), loop.law.structure, _structures(loop.elements)
     if key not in _built:
-        _built[key] = _compile(ClosedLoop(law))
+        _built[key] = _compile(loop)
     return _built[key]
 
 
@@ -113,8 +112,12 @@ def structure(loop: SampledLoop) -> tuple[object, ...]:
     of_tank = type(tank) if tank is None or type(tank) in TANKS.values() else tank
     return (
         _urdf(law.robot.arm), law.structure, of_tank, controller.external, controller.inner, controller.actions,
-        loop.elements,
+        _structures(loop.elements),
     )  # fmt: skip
+
+
+def _structures(elements: Elements) -> tuple[Hashable, ...]:
+    return tuple(e.structure for e in elements)
 
 
 @lru_cache(maxsize=64)

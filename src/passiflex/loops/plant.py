@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from types import SimpleNamespace
 from typing import NamedTuple
 
 import casadi as cs
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
-from passiflex.layout import Field, Layout
-from passiflex.loops.elements import AbstractElement, Drag, Effect, MotorFriction, Touch, nothing
+from passiflex.elements import AbstractElement, Drag, Effect, MotorFriction, Touch, nothing
+from passiflex.layout import Field, Layout, Signal
 from passiflex.robots.arm import TipWrench
 from passiflex.robots.flexible import FlexibleJointRobot, RobotState
+
+Array = NDArray[np.float64]
 
 PORTS = (
     Field("external", (), "J", "∫ τ_eᵀ q̇: given to the robot by its environment"),
@@ -26,22 +31,16 @@ ELEMENTS: Elements = (MotorFriction(), Drag())
 """What may touch the robot of a sampled loop."""
 
 
-def touching(*, friction: bool, drag: bool) -> Elements:
-    """Return the elements of a sampled loop, of which these act."""
-    return MotorFriction(acts=friction), Drag(acts=drag)
-
-
 class Flow(NamedTuple):
-    """What happens in a state: accelerations (n,), and the powers of `Plant.energies` by name [W]."""
+    """What happens in a state: its rate, by name, and the powers of `Plant.energies` by name [W]."""
 
-    ddq: cs.SX
-    ddtheta: cs.SX
+    rate: dict[str, cs.SX]
     powers: dict[str, cs.SX]
 
 
 @dataclass(frozen=True, eq=False)
 class Plant:
-    """ẋ = f(x, [τ_m, environment], p) for x = (q, θ, q̇, θ̇), with what passes its ports.
+    """ẋ = f(x, [τ_m, environment], p) for x = (q, θ, q̇, θ̇, states of elements), with what passes its ports.
 
     Attributes
     ----------
@@ -56,6 +55,10 @@ class Plant:
         """Return the robot's numbers and those of the elements."""
         return sum((e.parameters(self.robot.n) for e in self.elements), self.robot.layout)
 
+    def numbers(self, robot: Mapping[str, ArrayLike]) -> dict[str, ArrayLike]:
+        """Return the values of `parameters` for the numbers of a robot."""
+        return {**robot, **{k: v for e in self.elements for k, v in e.numbers(self.robot.n).items()}}
+
     @cached_property
     def environment(self) -> Layout:
         """Return what a schedule may change."""
@@ -63,103 +66,138 @@ class Plant:
         return sum((e.inputs() for e in self.elements), Layout((wrench,)))
 
     @cached_property
+    def booked(self) -> Elements:
+        """Return the elements of which a run has books."""
+        return tuple(e for e in self.elements if e.acts or e.always)
+
+    @cached_property
     def energies(self) -> Layout:
         """Return what is summed up over time."""
-        return Layout(PORTS + tuple(Field(e.booked, (), "J", e.meaning) for e in self.elements if e.booked))
+        lost = tuple(Field(e.name, (), "J", e.meaning) for e in self.booked)
+        given = tuple(
+            Field(f"{e.name}_given", (), "J", "given to the robot") for e in self.booked if e.stores
+        )
+        return Layout(PORTS + lost + given)
 
     @cached_property
     def state(self) -> Layout:
         """Return the state."""
         n, (angle, speed, _) = self.robot.n, self.robot.arm.chain.joint_units
-        return Layout(
-            (
-                Field("q", (n,), angle, "link position"),
-                Field("theta", (n,), angle, "motor position"),
-                Field("dq", (n,), speed, "link velocity"),
-                Field("dtheta", (n,), speed, "motor velocity"),
-            )
+        robot = (
+            Field("q", (n,), angle, "link position"),
+            Field("theta", (n,), angle, "motor position"),
+            Field("dq", (n,), speed, "link velocity"),
+            Field("dtheta", (n,), speed, "motor velocity"),
         )
+        return sum((e.state(n) for e in self.elements), Layout(robot))
 
-    @cached_property
-    def truth(self) -> Layout:
-        """Return what is true at one instant."""
-        n, (_, _, torque) = self.robot.n, self.robot.arm.chain.joint_units
-        return Layout(
-            (
-                Field("position", (3,), "m", "end effector", axes=("axis",)),
-                Field("rotation", (3, 3), "1", "axes of the end effector", axes=("axis", "column")),
-                Field("tau_a", (n,), torque, "torque through the joint, positive on the link"),
-                Field("tau_e", (n,), torque, "external joint torque"),
-                Field("wrench", (6,), "N, N m", "on the end effector, drag included", axes=("component",)),
-                Field("link_kinetic_energy", (), "J", "½ q̇ᵀ M q̇"),
-                Field("motor_kinetic_energy", (), "J", "½ θ̇ᵀ B θ̇"),
-                Field("joint_spring_energy", (), "J", "½ (θ−q)ᵀ K (θ−q)"),
-                Field("potential_energy", (), "J", "V(q)"),
-            )
-        )
+    def at_rest(self, q: Array, theta: Array) -> Array:
+        """Return the flat state of a robot that stands still, with elements that have not been touched."""
+        return self.state.pack(self.state.zeros() | {"q": q, "theta": theta})
 
     def view(self, x: cs.SX) -> RobotState:
-        """Return the named parts of the state."""
-        return RobotState(*cs.vertsplit(x, self.robot.n))
+        """Return the robot's own state."""
+        return RobotState(*(x[self.state.slices[name]] for name in RobotState._fields))
 
-    def flow(self, x: RobotState, tau_m: cs.SX, s: SimpleNamespace, m: SimpleNamespace) -> Flow:
+    def flow(self, x: cs.SX, tau_m: cs.SX, s: SimpleNamespace, m: SimpleNamespace) -> Flow:
         """Return what happens in the state x under a motor torque."""
-        arm = self.robot.arm
-        at = Touch(x, *arm.tip_velocity(x.q, x.dq, m))
-        effects = self._effects(at, s, m)
+        arm, robot = self.robot.arm, self.view(x)
+        at = self._touch(x, m)
+        effects = self._effects(at, x, s, m)
         touched = _sum(effects, self.robot.n)
-        given = TipWrench(*(arm.in_tip_axes(x.q, half) for half in cs.vertsplit(s.F_e, 3)))
+        given = TipWrench(*(arm.in_tip_axes(robot.q, half) for half in cs.vertsplit(s.F_e, 3)))
         pushed = TipWrench(given.force + touched.force, given.moment + touched.moment)
-        a = self.robot.acceleration(x, tau_m + touched.motor, pushed, m)
-        stretch = x.dtheta - x.dq
+        a = self.robot.acceleration(robot, tau_m + touched.motor, pushed, m)
+        stretch = robot.dtheta - robot.dq
         powers = {
             "external": cs.dot(pushed.force, at.velocity) + cs.dot(pushed.moment, at.spin),
-            "motor": cs.dot(tau_m, x.dtheta),
-            "joint": cs.dot(a.tau_a, x.dq),
+            "motor": cs.dot(tau_m, robot.dtheta),
+            "joint": cs.dot(a.tau_a, robot.dq),
             "joint_loss": cs.dot(stretch, m.joint_damping * stretch),
         }
-        lost = {e.booked: f.lost for e, f in zip(self.elements, effects, strict=True) if e.booked}
-        return Flow(a.ddq, a.ddtheta, powers | lost)
+        rate = {"q": robot.dq, "theta": robot.dtheta, "dq": a.ddq, "dtheta": a.ddtheta}
+        for element, effect in zip(self.elements, effects, strict=True):
+            if element in self.booked:
+                powers[element.name] = effect.lost
+                powers[f"{element.name}_given"] = given_by(effect, at)
+            rate |= vars(element.state(self.robot.n).view(effect.rate))
+        return Flow(rate, {f.name: powers[f.name] for f in self.energies})
 
-    def _effects(self, at: Touch, s: SimpleNamespace, m: SimpleNamespace) -> list[Effect]:
-        return [e.act(at, s, m) if e.acts else nothing(self.robot.n) for e in self.elements]
+    def _touch(self, x: cs.SX, m: SimpleNamespace) -> Touch:
+        arm, robot = self.robot.arm, self.view(x)
+        velocity, spin = arm.tip_velocity(robot.q, robot.dq, m)
+        return Touch(robot, velocity, spin, *arm.pose(robot.q, m), own=SimpleNamespace())
 
-    def wrench(self, x: RobotState, s: SimpleNamespace, m: SimpleNamespace) -> cs.SX:
+    def _effects(self, at: Touch, x: cs.SX, s: SimpleNamespace, m: SimpleNamespace) -> list[Effect]:
+        effects = []
+        for element in self.elements:
+            layout = element.state(self.robot.n)
+            own = SimpleNamespace(**{f.name: getattr(self.state.view(x), f.name) for f in layout})
+            acting = element.act(at._replace(own=own), s, m) if element.acts else nothing(self.robot.n)
+            effects.append(acting)
+        return effects
+
+    def wrench(self, x: cs.SX, s: SimpleNamespace, m: SimpleNamespace) -> cs.SX:
         """Return all that acts on the end effector, in world axes (6,)."""
-        arm = self.robot.arm
-        at = Touch(x, *arm.tip_velocity(x.q, x.dq, m))
-        touched = _sum(self._effects(at, s, m), self.robot.n)
-        return s.F_e + cs.vertcat(*(arm.in_world_axes(x.q, part) for part in (touched.force, touched.moment)))
+        return self._world_wrench(_sum(self._effects(self._touch(x, m), x, s, m), self.robot.n), x, s)
 
-    def true(self, x: RobotState, s: SimpleNamespace, m: SimpleNamespace) -> dict[str, cs.SX]:
-        """Return the signals of `truth` by name."""
-        arm, stretch = self.robot.arm, x.theta - x.q
-        wrench, pose = self.wrench(x, s, m), arm.pose(x.q, m)
-        return {
-            "position": pose.position,
-            "rotation": pose.rotation,
-            "tau_a": self.robot.joint_torque(x, m),
-            "tau_e": arm.jacobian(x.q, m).T @ wrench,
-            "wrench": wrench,
-            "link_kinetic_energy": cs.dot(x.dq, arm.mass_matrix(x.q, m) @ x.dq) / 2,
-            "motor_kinetic_energy": cs.dot(x.dtheta, m.motor_inertia * x.dtheta) / 2,
-            "joint_spring_energy": cs.dot(stretch, m.joint_stiffness * stretch) / 2,
-            "potential_energy": arm.potential_energy(x.q, m),
-        }
+    def _world_wrench(self, touched: Effect, x: cs.SX, s: SimpleNamespace) -> cs.SX:
+        parts = (
+            self.robot.arm.in_world_axes(self.view(x).q, part) for part in (touched.force, touched.moment)
+        )
+        return s.F_e + cs.vertcat(*parts)
+
+    def true(self, x: cs.SX, s: SimpleNamespace, m: SimpleNamespace) -> tuple[Signal, ...]:
+        """Return what is true at one instant."""
+        arm, robot, n = self.robot.arm, self.view(x), self.robot.n
+        torque, energy = arm.chain.joint_units[2], (lambda name, text: Field(name, (), "J", text))
+        effects = self._effects(self._touch(x, m), x, s, m)
+        wrench, pose = self._world_wrench(_sum(effects, n), x, s), arm.pose(robot.q, m)
+        tau_a, tau_e = self.robot.joint_torque(robot, m), arm.jacobian(robot.q, m).T @ wrench
+        stretch, M = robot.theta - robot.q, arm.mass_matrix(robot.q, m)
+        kinetic = cs.dot(robot.dq, M @ robot.dq) / 2
+        turning = cs.dot(robot.dtheta, m.motor_inertia * robot.dtheta) / 2
+        spring = cs.dot(stretch, m.joint_stiffness * stretch) / 2
+        across = ("axis", "column")
+        stored = (
+            Signal(energy(f"{e.name}_storage", "stored in it"), f.stored)
+            for e, f in zip(self.elements, effects, strict=True)
+            if e.stores and e in self.booked
+        )
+        return (
+            Signal(Field("position", (3,), "m", "end effector", axes=("axis",)), pose.position),
+            Signal(Field("rotation", (3, 3), "1", "axes of the end effector", axes=across), pose.rotation),
+            Signal(Field("tau_a", (n,), torque, "torque through the joint, positive on the link"), tau_a),
+            Signal(Field("tau_e", (n,), torque, "external joint torque"), tau_e),
+            Signal(Field("wrench", (6,), "N, N m", "all on the end effector", axes=("component",)), wrench),
+            Signal(energy("link_kinetic_energy", "½ q̇ᵀ M q̇"), kinetic),
+            Signal(energy("motor_kinetic_energy", "½ θ̇ᵀ B θ̇"), turning),
+            Signal(energy("joint_spring_energy", "½ (θ−q)ᵀ K (θ−q)"), spring),
+            Signal(energy("potential_energy", "V(q)"), arm.potential_energy(robot.q, m)),
+            *stored,
+        )
 
     @cached_property
     def rhs(self) -> cs.Function:
         """Return (x, u, p) → (ẋ, powers)."""
         n = self.robot.n
-        state = cs.SX.sym("x", 4 * n)
-        u = cs.SX.sym("u", n + self.environment.size)
+        x, u = cs.SX.sym("x", self.state.size), cs.SX.sym("u", n + self.environment.size)
         p, m = self.parameters.symbols("p")
-        x = self.view(state)
         flow = self.flow(x, u[:n], self.environment.view(u[n:]), m)
-        slope = cs.vertcat(x.dq, x.dtheta, flow.ddq, flow.ddtheta)
-        powers = self.energies.stack(flow.powers)
-        return cs.Function("plant", [state, u, p], [cs.densify(slope), cs.densify(powers)], {"cse": True})
+        slope, powers = self.state.stack(flow.rate), self.energies.stack(flow.powers)
+        return cs.Function("plant", [x, u, p], [cs.densify(slope), cs.densify(powers)], {"cse": True})
+
+
+def given_by(effect: Effect, at: Touch) -> cs.SX:
+    """Return the power that an element gives to the robot [W]."""
+    at_tip = cs.dot(effect.force, at.velocity) + cs.dot(effect.moment, at.spin)
+    return cs.dot(effect.motor, at.x.dtheta) + at_tip
 
 
 def _sum(effects: list[Effect], n: int) -> Effect:
-    return Effect(*(sum(parts, start) for *parts, start in zip(*effects, nothing(n), strict=True)))
+    """Return what all of them do to the robot."""
+    none = nothing(n)
+    motor, force, moment = (
+        sum((getattr(e, part) for e in effects), getattr(none, part)) for part in ("motor", "force", "moment")
+    )
+    return none._replace(motor=motor, force=force, moment=moment)

@@ -6,7 +6,8 @@ from functools import cache
 
 from passiflex.control.law import ImpedanceLaw
 from passiflex.layout import Field, Layout
-from passiflex.loops.closed_loop import ENERGIES, ClosedLoop
+from passiflex.loops.closed_loop import ClosedLoop
+from passiflex.loops.plant import ELEMENTS
 from passiflex.loops.sampled_loop import SampledLoop
 from passiflex.robots.flexible import FlexibleJointRobot
 from passiflex.sampled.controller import SampledController
@@ -35,9 +36,9 @@ def axes_of_signals() -> dict[str, tuple[str, ...]]:
     """Return the axes of every signal that a run over time may have, after that of time."""
     law = ImpedanceLaw(FlexibleJointRobot.load("planar2r"))
     everything = SampledController(law, PortTank(), MomentumObserver(), MatchedInnerLoop())
-    continuous = ClosedLoop(law)
+    continuous = ClosedLoop(law, ELEMENTS)
     layouts = [*sample_parts(SampledLoop(everything)).values(), continuous.state, continuous.output_layout]
-    layouts.append(energies(ENERGIES))
+    layouts.append(energies(continuous.energies))
     return {f.name: f.dims for layout in layouts for f in layout.kept}
 
 

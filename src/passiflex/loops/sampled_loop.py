@@ -4,27 +4,44 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import casadi as cs
 import numpy as np
 from numpy.typing import NDArray
 
 from passiflex.control.signals import Measurement
-from passiflex.layout import Field, Layout
-from passiflex.loops.parts import Parts
+from passiflex.layout import Field, Layout, Signal
 from passiflex.loops.period_row import PeriodRow
 from passiflex.loops.plant import ELEMENTS, Elements, Plant
 from passiflex.loops.witness import LARGEST, Instant, Witness
 from passiflex.native import Watch
+from passiflex.parts import Parts
 from passiflex.robots.arm import EndEffectorPose
 from passiflex.sampled.controller import SampledController
 from passiflex.sampled.motors import limit_layout, limited
 from passiflex.sampled.rest import Rest
 from passiflex.sampled.sensors import Sensors
-from passiflex.sampled.signals import ControlParameters, Setpoint
+from passiflex.sampled.signals import ControlParameters, PeriodResult, Setpoint
 
 AT_ONCE = 1e-7
 """Two instants closer than this are one [s], after millions of periods; a law claims a level when it reads."""
+
+
+class _Period(NamedTuple):
+    """One period in symbols: (x, c, row, p), the memory after it, the torque applied, and what is recorded."""
+
+    inputs: tuple[cs.SX, ...]
+    after: cs.SX
+    applied: cs.SX
+    signals: tuple[Signal, ...]
+
+
+class _Truth(NamedTuple):
+    """One instant in symbols: (x, command, environment, p), and what is true then."""
+
+    inputs: tuple[cs.SX, ...]
+    signals: tuple[Signal, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,11 +69,11 @@ class SampledLoop:
     @cached_property
     def parameters(self) -> Parts:
         """Return the layouts of everything that `control` is told."""
-        n = self.controller.law.robot.n
-        model, gains, fallback, tank, actions, observer, inner, errors = self.controller.parameters
-        plant, sensors, limits = self.plant.parameters, self.sensors.layout, limit_layout(n)
-        own = model, gains, fallback, tank, actions, observer, inner, errors
-        return Parts(plant, *own, sensors, limits)
+        own = self.controller.parameters
+        limits = limit_layout(self.controller.law.robot.n)
+        return Parts(
+            {"plant": self.plant.parameters, **own.layouts, "sensors": self.sensors.layout, "limits": limits}
+        )
 
     @cached_property
     def memory(self) -> Layout:
@@ -83,56 +100,29 @@ class SampledLoop:
         """Return what is told anew in every period; the environment come first."""
         return self.period.layout
 
-    @cached_property
+    @property
     def signals(self) -> Layout:
         """Return what `control` says of one period."""
-        robot = self.controller.law.robot
-        n, (angle, speed, torque) = robot.n, robot.arm.chain.joint_units
-        claimed = "claimed by the law"
-        return Layout(
-            (
-                Field("measured_q", (n,), angle, "q as the sensors have it"),
-                Field("measured_theta", (n,), angle, "θ as the sensors have it"),
-                Field("measured_dq", (n,), speed, "q̇ as the sensors have it"),
-                Field("measured_dtheta", (n,), speed, "θ̇ as the sensors have it"),
-                Field("measured_tau_a", (n,), torque, "τ_a as the sensors have it"),
-                Field("believed_tau_e", (n,), torque, "τ_e as the law believes it"),
-                Field("commanded_torque", (n,), torque, "τ_m before the motors' limits"),
-                Field("tau_u", (n,), torque, "outer-loop torque"),
-                Field("phi", (n,), angle, "shaped motor coordinate of (11)"),
-                Field("dphi", (n,), speed, "its velocity"),
-                Field("compensated_energy", (), "J", f"V̂(q) of the law's model, {claimed}"),
-                Field("shaped_kinetic_energy", (), "J", f"½ φ̇ᵀ B_e φ̇, {claimed}"),
-                Field("shaped_spring_energy", (), "J", f"½ (φ−q)ᵀ K_e (φ−q), {claimed}"),
-                Field("cartesian_spring_energy", (), "J", f"U(φ; x̂_d), {claimed}"),
-                Field("gravity_storage", (), "J", f"of the gravity compensation, {claimed}"),
-                Field("reference_share", (), "1", "γ of the reference"),
-                Field("stiffness_share", (), "1", "γ of the stiffness"),
-                Field("valve", (), "1", "β"),
-            )
-        )
+        return Layout.of(self._period.signals)
 
-    @cached_property
+    @property
     def truth(self) -> Layout:
         """Return what `outputs` says of one instant."""
-        carried = Field("carried_energy", (), "J", "V̂(q) of the law's model, where the links really are")
-        powers = (Field(f"{f.name}_power", (), "W", f"rate of {f.name}_energy") for f in self.plant.energies)
-        return self.plant.truth + Layout((carried, *powers))
+        return Layout.of(self._truth.signals)
 
     @cached_property
-    def control(self) -> cs.Function:
-        """Return (x, c, row, p) → (c, command, signals)."""
+    def _period(self) -> _Period:
         robot = self.controller.law.robot
-        state = cs.SX.sym("x", 4 * robot.n)
+        state, p = cs.SX.sym("x", self.plant.state.size), cs.SX.sym("p", self.parameters.size)
         memory, c = self.memory.symbols("c")
         row, w = self.row.symbols("row")
-        p = cs.SX.sym("p", self.parameters.size)
-        views = self.parameters.view(p)
-        x = self.plant.view(state)
-        wrench, tau_a = self.plant.wrench(x, w, views.plant), robot.joint_torque(x, views.plant)
-        tau_e = robot.arm.jacobian(x.q, views.plant).T @ wrench
-        true = Measurement(x.q, x.theta, x.dq, x.dtheta, tau_a, wrench, tau_e)
-        y, read = self.sensors.read(true, w.torque_noise, w.elapsed, c, views.sensors)
+        views, x = self.parameters.view(p), self.plant.view(state)
+        plant, limits = views["plant"], views["limits"]
+        wrench, tau_a = self.plant.wrench(state, w, plant), robot.joint_torque(x, plant)
+        tau_e = robot.arm.jacobian(x.q, plant).T @ wrench
+        y, read = self.sensors.read(
+            Measurement(*x, tau_a, wrench, tau_e), w.torque_noise, w.elapsed, c, views["sensors"]
+        )
         setpoint = Setpoint(
             EndEffectorPose(w.desired_position, w.desired_rotation),
             w.desired_velocity,
@@ -141,62 +131,84 @@ class SampledLoop:
             w.desired_damping,
             w.feedforward,
         )
-        told = ControlParameters(*(getattr(views, part) for part in ControlParameters._fields))
+        numbers = ControlParameters(**{part: views[part] for part in ControlParameters._fields})
         start = self.sensors.state.size
         own = memory[start : start + self.controller.state.size]
-        command, after, entry, believed = self.controller.step(
-            y, setpoint, w.elapsed, c.applied_torque, own, told
+        result = self.controller.step(y, setpoint, w.elapsed, c.applied_torque, own, numbers)
+        applied = limited(
+            result.command.tau_m, c.applied_torque, limits.torque_limit, limits.torque_rate_limit, w.elapsed
         )
-        limits = views.limits
-        given = limited(
-            command.tau_m, c.applied_torque, limits.torque_limit, limits.torque_rate_limit, w.elapsed
+        carried = robot.arm.potential_energy(y.q, views["model"])
+        return _Period(
+            (state, memory, row, p),
+            cs.vertcat(read, result.state, applied),
+            applied,
+            self._said(y, result, carried),
         )
+
+    def _said(self, y: Measurement, result: PeriodResult, carried: cs.SX) -> tuple[Signal, ...]:
+        """Return what is recorded of a period."""
+        robot, command, entry = self.controller.law.robot, result.command, result.entry
+        n, (angle, speed, torque) = robot.n, robot.arm.chain.joint_units
         claim = command.energy
-        signals = self.signals.stack(
-            {
-                "measured_q": y.q,
-                "measured_theta": y.theta,
-                "measured_dq": y.dq,
-                "measured_dtheta": y.dtheta,
-                "measured_tau_a": y.tau_a,
-                "believed_tau_e": believed.tau_e,
-                "commanded_torque": command.tau_m,
-                "tau_u": command.tau_u,
-                "phi": command.phi,
-                "dphi": command.dphi,
-                "compensated_energy": robot.arm.potential_energy(y.q, views.model),
-                "shaped_kinetic_energy": claim.motor_kinetic,
-                "shaped_spring_energy": claim.joint_spring,
-                "cartesian_spring_energy": claim.cartesian_spring,
-                "gravity_storage": claim.gravity_storage,
-                "reference_share": entry.reference_share,
-                "stiffness_share": entry.stiffness_share,
-                "valve": entry.valve,
-            }
+
+        def read(name: str, unit: str, symbol: str, value: cs.SX) -> Signal:
+            return Signal(Field(f"measured_{name}", (n,), unit, f"{symbol} as the sensors have it"), value)
+
+        def claimed(name: str, what: str, value: cs.SX) -> Signal:
+            return Signal(Field(name, (), "J", f"{what}, claimed by the law"), value)
+
+        believed = result.believed.tau_e
+        return (
+            read("q", angle, "q", y.q),
+            read("theta", angle, "θ", y.theta),
+            read("dq", speed, "q̇", y.dq),
+            read("dtheta", speed, "θ̇", y.dtheta),
+            read("tau_a", torque, "τ_a", y.tau_a),
+            Signal(Field("believed_tau_e", (n,), torque, "τ_e as the law believes it"), believed),
+            Signal(Field("commanded_torque", (n,), torque, "τ_m before the motors' limits"), command.tau_m),
+            Signal(Field("tau_u", (n,), torque, "outer-loop torque"), command.tau_u),
+            Signal(Field("phi", (n,), angle, "shaped motor coordinate of (11)"), command.phi),
+            Signal(Field("dphi", (n,), speed, "its velocity"), command.dphi),
+            claimed("compensated_energy", "V̂(q) of the law's model", carried),
+            claimed("shaped_kinetic_energy", "½ φ̇ᵀ B_e φ̇", claim.motor_kinetic),
+            claimed("shaped_spring_energy", "½ (φ−q)ᵀ K_e (φ−q)", claim.joint_spring),
+            claimed("cartesian_spring_energy", "U(φ; x̂_d)", claim.cartesian_spring),
+            claimed("gravity_storage", "of the gravity compensation", claim.gravity_storage),
+            Signal(Field("reference_share", (), "1", "γ of the reference"), entry.reference_share),
+            Signal(Field("stiffness_share", (), "1", "γ of the stiffness"), entry.stiffness_share),
+            Signal(Field("valve", (), "1", "β"), entry.valve),
         )
-        next_memory = cs.vertcat(read, after, given)
-        return cs.Function(
-            "control",
-            [state, memory, row, p],
-            [cs.densify(next_memory), cs.densify(given), cs.densify(signals)],
-            {"cse": True},
+
+    @cached_property
+    def control(self) -> cs.Function:
+        """Return (x, c, row, p) → (c, command, signals)."""
+        period = self._period
+        told = [period.after, period.applied, self.signals.stack_of(period.signals)]
+        return cs.Function("control", list(period.inputs), [cs.densify(v) for v in told], {"cse": True})
+
+    @cached_property
+    def _truth(self) -> _Truth:
+        robot = self.controller.law.robot
+        state, command = cs.SX.sym("x", self.plant.state.size), cs.SX.sym("command", robot.n)
+        environment, s = self.plant.environment.symbols("s")
+        p = cs.SX.sym("p", self.parameters.size)
+        views, x = self.parameters.view(p), self.plant.view(state)
+        carried = Field("carried_energy", (), "J", "V̂(q) of the law's model, where the links really are")
+        powers = self.plant.flow(state, command, s, views["plant"]).powers.items()
+        rates = (Signal(Field(f"{f}_power", (), "W", f"rate of {f}_energy"), power) for f, power in powers)
+        signals = (
+            *self.plant.true(state, s, views["plant"]),
+            Signal(carried, robot.arm.potential_energy(x.q, views["model"])),
+            *rates,
         )
+        return _Truth((state, command, environment, p), signals)
 
     @cached_property
     def outputs(self) -> cs.Function:
         """Return (x, command, environment, p) → `truth`, with p as for `control`."""
-        robot = self.controller.law.robot
-        state, command = cs.SX.sym("x", 4 * robot.n), cs.SX.sym("command", robot.n)
-        environment, s = self.plant.environment.symbols("s")
-        p = cs.SX.sym("p", self.parameters.size)
-        views, x = self.parameters.view(p), self.plant.view(state)
-        powers = self.plant.flow(x, command, s, views.plant).powers
-        true = self.plant.true(x, s, views.plant) | {
-            "carried_energy": robot.arm.potential_energy(x.q, views.model),
-            **{f"{name}_power": power for name, power in powers.items()},
-        }
-        told = [state, command, environment, p]
-        return cs.Function("truth", told, [cs.densify(self.truth.stack(true))], {"cse": True})
+        true = cs.densify(self.truth.stack_of(self._truth.signals))
+        return cs.Function("truth", list(self._truth.inputs), [true], {"cse": True})
 
     @cached_property
     def witness(self) -> Witness:
@@ -212,23 +224,24 @@ class SampledLoop:
         time, command, y = (
             cs.SX.sym("time"),
             cs.SX.sym("command", n),
-            cs.SX.sym("y", 4 * n + self.plant.energies.size),
+            cs.SX.sym("y", self.plant.state.size + self.plant.energies.size),
         )
         controller, c = self.memory.symbols("c")
         signals, z = self.signals.symbols("z")
         p = cs.SX.sym("p", size + witness.parameters.size)
         views = self.parameters.view(p[:size])
-        x, passed = self.plant.view(y[: 4 * n]), self.plant.energies.view(y[4 * n :])
+        end = self.plant.state.size
+        x, passed = self.plant.view(y[:end]), self.plant.energies.view(y[end:])
         level = c.tank_energy if law.has_tank else -c.reference_energy  # which was lent
         claimed = ("shaped_kinetic", "cartesian_spring", "shaped_spring", "compensated")
-        carried = arm.potential_energy(x.q, views.model)
+        carried = arm.potential_energy(x.q, views["model"])
         now = Instant(
             time=time,
             q=x.q,
             dq=x.dq,
             tau_m=command,
-            link_kinetic=arm.kinetic_energy(x.q, x.dq, views.plant),
-            link_potential=arm.potential_energy(x.q, views.plant),
+            link_kinetic=arm.kinetic_energy(x.q, x.dq, views["plant"]),
+            link_potential=arm.potential_energy(x.q, views["plant"]),
             carried=carried,
             external=passed.external,
             joint=passed.joint,

@@ -13,11 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from passiflex.control.motion import Motion, Pose, pose_at, shifted
 from passiflex.errors import NameUnknownError, ValueRangeError
-from passiflex.loops.parts import Parts
 from passiflex.problems.posture import posture
-from passiflex.problems.problem import Problem, Sampling
-from passiflex.sampled.controller import SampledController
-from passiflex.sampled.matched_loop import MatchedInnerLoop
+from passiflex.problems.problem import Problem, SampledProblem, require_sampled
 from passiflex.scenarios.control_settings import MOST_PERIODS
 from passiflex.scenarios.scenario import Scenario
 from passiflex.scenarios.scenario_file import parse_scenario
@@ -43,7 +40,7 @@ def altered(
     delay: float | None = None,
     gains: Mapping[str, ArrayLike] | None = None,
     plant: Mapping[str, ArrayLike] | None = None,
-) -> Problem:
+) -> SampledProblem:
     """Return the sampled problem with what is given in place of its own; what is left out stays.
 
     The inner loop predicts over the new delay, the noise is held for as many periods, the arm rests under its new
@@ -60,52 +57,43 @@ def altered(
     ValueRangeError, NameUnknownError, SizeError
         For a problem in continuous time, a rate or delay that makes no sense, gains or numbers that do not fit.
     """
-    s, law = _sampling(problem), problem.law
+    s, law = require_sampled(problem), problem.law
     period, late = require_timing(s.period, s.delay, rate, delay)
-    own = law.layout.unpack(problem.gains)
+    own = law.layout.unpack(s.gains)
     for name in gains or {}:
         if name not in own or name not in GAINS:
             raise NameUnknownError("gain", name, [g for g in GAINS if g in own])
-    own |= {name: np.asarray(value, dtype=float) for name, value in (gains or {}).items()}
-    true = law.robot.layout.unpack(problem.plant) | {
-        k: np.asarray(v, float) for k, v in (plant or {}).items()
-    }
-    data = read_back(problem.configuration)
+    new = {name: np.asarray(value, dtype=float) for name, value in (gains or {}).items()}
+    own |= new
+    law.layout.pack(own)
+    true = s.parts.unpack("plant", s.numbers) | {k: np.asarray(v, float) for k, v in (plant or {}).items()}
+    s.parts["plant"].pack(true)
+    data = read_back(s.text)
     if rate is not None or delay is not None:
         _write_timing(data, period, late, rate)
     if gains is not None:
         _write_gains(data["law"], own)
     if plant is not None:
         data["robot"] = f"{law.robot.name}, changed in memory"
-
-    parts = s.loop.parameters
     kept = data["control"].get("fallback", {})
-    fallback = {k: v for k, v in own.items() if gains and k in gains and k not in kept and not _is_shaping(k)}
-    numbers = replaced(parts, s.numbers, own, "gains")
-    numbers = replaced(parts, numbers, fallback, "fallback")
-    numbers = replaced(parts, numbers, true, "plant")
-    for part in ("inner", "errors"):
-        numbers = replaced(parts, numbers, {"period": period}, part)
-    noise = problem.noise
-    if noise is not None:
-        noise = noise._replace(hold=_held(noise.hold, s.period) * period)
-        numbers = replaced(parts, numbers, {"noise_hold": noise.hold}, "errors")
+    fallback = {k: v for k, v in new.items() if k not in kept and not _is_shaping(k)}
     changed = dataclasses.replace(
-        problem,
-        gains=law.layout.pack(own),
-        plant=law.robot.layout.pack(true),
-        noise=noise,
+        s,
         output_interval=float(data["output_interval"]),
-        configuration=_text(data),
-        sampling=dataclasses.replace(
-            s,
-            controller=_predicting(s.controller, round(late / period)),
-            period=period,
-            delay=late,
-            numbers=numbers,
-            plant=numbers[: parts.plant.size],
+        text=_text(data),
+        controller=dataclasses.replace(
+            s.controller, inner=s.controller.inner.expecting(round(late / period))
         ),
+        period=period,
+        delay=late,
     )
+    for part, values in (("gains", own), ("fallback", fallback), ("plant", true)):
+        changed = changed.with_numbers(values, part)
+    for part in ("inner", "errors"):
+        changed = changed.with_numbers({"period": period}, part)
+    if s.noise is not None:
+        noise = s.noise._replace(hold=_held(s.noise.hold, s.period) * period)
+        changed = dataclasses.replace(changed, noise=noise).with_numbers({"noise_hold": noise.hold}, "errors")
     return changed if gains is None and plant is None else _at_rest(changed, true)
 
 
@@ -143,18 +131,13 @@ def rewritten(text: str, entry: Mapping[str, Any]) -> str:
     return _text(merged(read_back(text), entry))
 
 
-def with_flange(problem: Problem, inertia: float) -> Problem:
+def with_flange(problem: SampledProblem, inertia: float) -> SampledProblem:
     """Return the problem with this much more inertia [kg m^2] about every axis of the last link, known to the law."""
-    layout, s = problem.law.robot.layout, _sampling(problem)
-    parts, numbers = s.loop.parameters, s.numbers
-    heavier: dict[str, Array] = {}
-    for part, flat in (("plant", problem.plant), ("model", problem.model)):
-        tensors = layout.unpack(flat)["link_inertia"].copy()
+    for part in ("plant", "model"):
+        tensors = problem.parts.unpack(part, problem.numbers)["link_inertia"].copy()
         tensors[-1, [0, 3, 5]] += inertia
-        heavier[part] = layout.pack(layout.unpack(flat) | {"link_inertia": tensors})
-        numbers = replaced(parts, numbers, {"link_inertia": tensors}, part)
-    sampling = dataclasses.replace(s, numbers=numbers, plant=numbers[: parts.plant.size])
-    return dataclasses.replace(problem, plant=heavier["plant"], model=heavier["model"], sampling=sampling)
+        problem = problem.with_numbers({"link_inertia": tensors}, part)
+    return problem
 
 
 def require_timing(
@@ -182,42 +165,14 @@ def require_timing(
     return period, late
 
 
-def replaced(parts: Parts, numbers: Array, values: Mapping[str, ArrayLike], only: str | None = None) -> Array:
-    """Return the flat parameters of the period with the named ones replaced, in every part that has them.
-
-    `only` names the one part in which they are.
-    """
-    out = numbers.copy()
-    for name, at in parts.slices.items():
-        own = getattr(parts, name).slices
-        for entry in own.keys() & values.keys() if only in (None, name) else ():
-            out[at][own[entry]] = np.ravel(values[entry])
-    return out
-
-
-def _sampling(problem: Problem) -> Sampling:
-    if problem.sampling is None:
-        raise ValueRangeError(
-            "the scenario has no control rate", got=problem.name, needs="`control: {rate: …}`"
-        )
-    return problem.sampling
-
-
 def _is_shaping(name: str) -> bool:
     """Return whether the fallback has a value of its own for this gain, whatever the law's."""
     return name.startswith("shaped_")
 
 
-def _predicting(controller: SampledController, late: int) -> SampledController:
-    if not isinstance(controller.inner, MatchedInnerLoop) or controller.inner.late == late:
-        return controller
-    return dataclasses.replace(controller, inner=MatchedInnerLoop(late))
-
-
-def _at_rest(problem: Problem, plant: dict[str, Array]) -> Problem:
+def _at_rest(problem: SampledProblem, plant: dict[str, Array]) -> SampledProblem:
     """Return the problem with motors, reference and held torque as they are at rest."""
     law, q = problem.law, problem.q
-    assert problem.sampling is not None
     weight = posture(law.robot, q, plant).gravity_torque
     stretch = weight / plant["joint_stiffness"]
     model, gains = law.robot.layout.unpack(problem.model), law.layout.unpack(problem.gains)
@@ -233,7 +188,7 @@ def _at_rest(problem: Problem, plant: dict[str, Array]) -> Problem:
         theta=q + stretch,
         home=home,
         events=tuple(events),
-        sampling=dataclasses.replace(problem.sampling, held=weight),
+        held=weight,
     )
 
 

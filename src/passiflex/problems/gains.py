@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from passiflex.control.damping_design import ElasticArm, damping_from_ratio, damping_of_elastic
 from passiflex.control.inner_loop import shaped_damping
 from passiflex.control.law import AbstractLaw
-from passiflex.control.tank import NO_CAP, EnergyTank
+from passiflex.control.tank import NO_CAP
 from passiflex.control.task import AbstractTask
 from passiflex.errors import SizeError
 from passiflex.problems.posture import Posture, held_jacobian
@@ -131,8 +131,8 @@ def tank_start(scenario: Scenario) -> TankStart:
     return TankStart(t.initial, t.floor, t.cap, t.signed) if t else TankStart(0, 0, 0, False)
 
 
-def tank_gains(scenario: Scenario) -> Array:
-    """Return the flat numbers of `EnergyTank.layout`."""
+def tank_gains(scenario: Scenario) -> dict[str, float]:
+    """Return the numbers of `EnergyTank.layout`."""
     t = scenario.tank
     values = (
         {
@@ -146,4 +146,4 @@ def tank_gains(scenario: Scenario) -> Array:
         if t
         else {"fill": 0, "floor": 0, "low": 1, "cap": NO_CAP, "band": 1, "signed": 0}
     )
-    return EnergyTank().layout.pack({f"tank_{name}": float(value) for name, value in values.items()})
+    return {f"tank_{name}": float(value) for name, value in values.items()}

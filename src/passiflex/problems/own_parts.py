@@ -10,12 +10,12 @@ from typing import Any
 import casadi as cs
 from numpy.typing import ArrayLike
 
-from passiflex.control.law import AbstractLaw, ImpedanceLaw
+from passiflex.control.law import AbstractLaw
+from passiflex.elements import AbstractElement, Effect, Touch
 from passiflex.errors import ArgumentError, ValueRangeError
-from passiflex.loops.elements import AbstractElement, Effect, Touch
-from passiflex.problems.problem import Problem
+from passiflex.loops.plant import Plant
+from passiflex.problems.problem import Problem, SampledProblem
 from passiflex.robots.flexible import RobotState
-from passiflex.sampled.matched_loop import MatchedInnerLoop
 from passiflex.sampled.tank import AbstractTank
 
 
@@ -34,13 +34,13 @@ def with_parts(
     law: In place of the scenario's, for the same robot; its gains are those of the scenario that have their names.
     gains: Of the law, by name, in place of the scenario's or beside them.
     tank: In place of the scenario's, with its settings.
-    elements: What touches the end effector beside the rest; their numbers are their own, so they have no parameters.
+    elements: What touches the robot beside the rest.
 
     Raises
     ------
     ValueRangeError
-        For another robot's law, or one in a matched loop, elements with parameters or on the motors, or a tank or
-        elements in continuous time.
+        For another robot's law, or one in a matched loop, an element with inputs or more than one port, two of one
+        name, or a tank in continuous time.
     ArgumentError
         For what is no such part, as its class.
     NameUnknownError, SizeError
@@ -57,13 +57,15 @@ def with_parts(
         changed = _with_law(changed, law, dict(gains or {}))
     elif gains:
         raise ValueRangeError("gains are those of a law of one's own", got=", ".join(gains), needs="law=")
-    if tank is not None or elements:
-        changed = _touched(changed, tank, tuple(elements))
+    if tank is not None:
+        changed = _with_tank(changed, tank)
+    if elements:
+        changed = _with_elements(changed, tuple(elements))
     own = [part for part in (law, tank, *elements) if part is not None]
     if not own:
         return problem
     said = f"# With parts that no scenario has: {', '.join(type(part).__name__ for part in own)}.\n"
-    return dataclasses.replace(changed, configuration=said + problem.configuration)
+    return dataclasses.replace(changed, text=said + problem.text)
 
 
 def _with_law(problem: Problem, law: AbstractLaw, gains: dict[str, Any]) -> Problem:
@@ -71,52 +73,59 @@ def _with_law(problem: Problem, law: AbstractLaw, gains: dict[str, Any]) -> Prob
         needs = f"that of the scenario, FlexibleJointRobot.load({problem.law.robot.name!r})"
         raise ValueRangeError("the law is for another robot", got=law.robot.name, needs=needs)
     own = {f.name for f in law.layout}
-
-    def packed(old: Mapping[str, Any]) -> dict[str, Any]:
-        return {name: value for name, value in old.items() if name in own} | gains
-
-    numbers = packed(problem.law.layout.unpack(problem.gains))
-    changed = dataclasses.replace(problem, law=law, gains=law.layout.pack(numbers))
-    s = problem.sampling
-    if s is None:
-        return changed
-    if isinstance(s.controller.inner, MatchedInnerLoop) and not isinstance(law, ImpedanceLaw):
-        needs = "`inner_loop: plain`, as the matched one takes the paper's law apart"
-        raise ValueRangeError("the law cannot be matched", got=type(law).__name__, needs=needs)
-    before, controller = s.loop.parameters, dataclasses.replace(s.controller, law=law)
-    values = {name: before.unpack(name, s.numbers) for name in before._fields}
-    values["gains"], values["fallback"] = packed(values["gains"]), packed(values["fallback"])
-    after = dataclasses.replace(s, controller=controller)
-    return dataclasses.replace(
-        changed, sampling=dataclasses.replace(after, numbers=after.loop.parameters.pack(**values))
-    )
+    before, numbers = problem.parts, problem.numbers
+    values: dict[str, dict[str, Any]] = {part: before.unpack(part, numbers) for part in before.layouts}
+    for part in {"gains", "fallback"} & values.keys():
+        values[part] = {name: value for name, value in values[part].items() if name in own} | gains
+    if isinstance(problem, SampledProblem):
+        if not problem.controller.inner.takes(law):
+            needs = "`inner_loop: plain`, as the matched one takes the paper's law apart"
+            raise ValueRangeError("the law cannot be matched", got=type(law).__name__, needs=needs)
+        controller = dataclasses.replace(problem.controller, law=law)
+        changed: Problem = dataclasses.replace(problem, law=law, controller=controller)
+    else:
+        changed = dataclasses.replace(problem, law=law)
+    return dataclasses.replace(changed, numbers=changed.parts.pack(values))
 
 
-def _touched(problem: Problem, tank: AbstractTank | None, elements: tuple[AbstractElement, ...]) -> Problem:
-    s = problem.sampling
-    if s is None:
-        raise ValueRangeError(
-            "a tank or elements of one's own are for sampled loops", needs="a scenario with `control`"
-        )
-    if tank is not None and s.controller.tank is None:
+def _with_tank(problem: Problem, tank: AbstractTank) -> Problem:
+    if not isinstance(problem, SampledProblem):
+        raise ValueRangeError("a tank of one's own is for sampled loops", needs="a scenario with `control`")
+    if problem.controller.tank is None:
         raise ValueRangeError("the scenario has no tank", needs="`tank: {}`, for its settings")
+    return dataclasses.replace(problem, controller=dataclasses.replace(problem.controller, tank=tank))
+
+
+def _with_elements(problem: Problem, elements: tuple[AbstractElement, ...]) -> Problem:
     n = problem.law.robot.n
-    if wrong := [e for e in elements if e.parameters(n).size or e.inputs().size]:
-        got = ", ".join(type(e).__name__ for e in wrong)
-        raise ValueRangeError(
-            "an element of one's own has parameters", got=got, needs="attributes of its own"
-        )
-    if wrong := [e for e in elements if e.booked or not _effect(e, n).motor.is_zero()]:
-        got = ", ".join(type(e).__name__ for e in wrong)
-        needs = "a force or a moment on the end effector: the ledger of the motors knows their friction only"
-        raise ValueRangeError("an element of one's own touches the motors", got=got, needs=needs)
-    controller = dataclasses.replace(s.controller, tank=tank or s.controller.tank)
-    sampling = dataclasses.replace(s, controller=controller, elements=(*s.elements, *elements))
-    return dataclasses.replace(problem, sampling=sampling)
+    for e in elements:
+        got = type(e).__name__
+        if e.inputs().size:
+            raise ValueRangeError(
+                "an element of one's own has inputs", got=got, needs="attributes of its own"
+            )
+        effect = _effect(e, n)
+        elsewhere = (effect.force, effect.moment) if e.port == "motors" else (effect.motor,)
+        if not all(part.is_zero() for part in elsewhere):
+            needs = '`port` says where, "motors" or "end effector": its books are kept there'
+            raise ValueRangeError(f"an element touches more than the {e.port}", got=got, needs=needs)
+        if not e.stores and not effect.stored.is_zero():
+            raise ValueRangeError("an element stores energy", got=got, needs="stores = True, for its books")
+    plant = Plant(problem.law.robot, (*problem.elements, *elements))
+    _ = plant.energies, plant.state  # which refuse two of one name
+    before, numbers = problem.parts, problem.numbers
+    values: dict[str, dict[str, Any]] = {part: before.unpack(part, numbers) for part in before.layouts}
+    for e in elements:
+        values["plant"] |= e.numbers(n)
+    changed = dataclasses.replace(problem, elements=plant.elements)
+    return dataclasses.replace(changed, numbers=changed.parts.pack(values))
 
 
 def _effect(element: AbstractElement, n: int) -> Effect:
     """Return what an element does, in symbols."""
     x = RobotState(*(cs.SX.sym(name, n) for name in RobotState._fields))
-    at = Touch(x, cs.SX.sym("velocity", 3), cs.SX.sym("spin", 3))
-    return element.act(at, SimpleNamespace(), SimpleNamespace())
+    velocity, spin, position = (cs.SX.sym(name, 3) for name in ("velocity", "spin", "position"))
+    _, own = element.state(n).symbols("own")
+    _, m = element.parameters(n).symbols("m")
+    at = Touch(x, velocity, spin, position, cs.SX.sym("rotation", 3, 3), own)
+    return element.act(at, SimpleNamespace(), m)

@@ -2,28 +2,44 @@
 
 from __future__ import annotations
 
+import dataclasses
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from types import MappingProxyType
+from typing import Any, NamedTuple, Self
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from passiflex.control.law import AbstractLaw
 from passiflex.control.motion import Motion, Pose
+from passiflex.errors import ValueRangeError
+from passiflex.loops.closed_loop import ClosedLoop
 from passiflex.loops.plant import Elements
 from passiflex.loops.sampled_loop import SampledLoop
+from passiflex.parts import Parts
 from passiflex.sampled.controller import SampledController
 
 Array = NDArray[np.float64]
+NOTHING: Mapping[str, float] = MappingProxyType({})
 
 
 class Event(NamedTuple):
-    """From `time` on, another motion of the reference (None: the same goes on) and this wrench F_e (6,)."""
+    """From `time` on, another motion of the reference (None: the same goes on), this wrench F_e (6,), and these inputs.
+
+    `inputs` are those of what touches the robot, by name; what is not named is 0.
+    """
 
     time: float
     motion: Motion | None
     F_e: Array
+    inputs: Mapping[str, float] = NOTHING
+
+    @property
+    def environment(self) -> dict[str, Any]:
+        """Return the numbers of `Plant.environment` that are not 0, by name."""
+        return {"F_e": self.F_e, **self.inputs}
 
 
 class Noise(NamedTuple):
@@ -60,66 +76,25 @@ class Lasting(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Sampling:
-    """How the law runs on a robot.
-
-    Attributes
-    ----------
-    controller: The law with tank, governor and estimators.
-    elements: What touches the robot.
-    period, delay, jitter: [s].
-    missed: Share of periods in which the law does not run.
-    allow_unstable: Whether to run a loop that is unstable by the limit map.
-    numbers: Flat vector of `SampledLoop.parameters`.
-    plant: Flat vector of `Plant.parameters`, the first part of it.
-    held: Motor torque at the start (n,).
-    gains: Changes of K_x and D_x, in the order of time.
-    feedforward: Wrenches (6,) that the end effector is to exert.
-    drags: Viscous and dry drag (2,).
-    """
-
-    controller: SampledController
-    elements: Elements
-    period: float
-    delay: float
-    jitter: float
-    missed: float
-    allow_unstable: bool
-    numbers: Array
-    plant: Array
-    held: Array
-    gains: tuple[GainChange, ...]
-    feedforward: tuple[Lasting, ...]
-    drags: tuple[Lasting, ...]
-
-    @cached_property
-    def loop(self) -> SampledLoop:
-        """Return the loop that runs."""
-        return SampledLoop(self.controller, self.elements)
-
-
-@dataclass(frozen=True, eq=False)
 class Problem:
-    """A closed loop with all its numbers.
+    """A closed loop in continuous time with all its numbers.
 
     Attributes
     ----------
     law: Structure of the law, with its robot.
-    plant, model, gains, tank_gains: Flat parameter vectors, in the order of `ClosedLoop.parameters`.
+    elements: What touches the robot.
+    numbers: Flat parameters of the loop, in the order of `parts`.
     q, theta: Start, at rest, (n,) rad.
     home: Pose that the reference holds at the start.
     events: By time; the first at time 0.
     duration, output_interval: [s].
-    configuration: The resolved scenario as text; it is stored beside the result.
-    sampling: How the law runs if it runs once per period; None in continuous time.
+    text: The resolved scenario; it is stored beside the result.
     """
 
     name: str
     law: AbstractLaw
-    plant: Array
-    model: Array
-    gains: Array
-    tank_gains: Array
+    elements: Elements
+    numbers: Array
     q: Array
     theta: Array
     home: Pose
@@ -130,10 +105,79 @@ class Problem:
     output_interval: float
     tolerance: float
     seed: int
-    configuration: str
-    sampling: Sampling | None = None
+    text: str
 
     @property
-    def parameters(self) -> Array:
-        """Return the flat parameter vector of the compiled closed loop."""
-        return np.concatenate([self.plant, self.model, self.gains, self.tank_gains])
+    def parts(self) -> Parts:
+        """Return whose the numbers are."""
+        return ClosedLoop(self.law, self.elements).parameters
+
+    @property
+    def plant(self) -> Array:
+        """Return the numbers of the robot and of what touches it, flat."""
+        return self.numbers[self.parts.slices["plant"]]
+
+    @property
+    def model(self) -> Array:
+        """Return the numbers of the law's model, flat."""
+        return self.numbers[self.parts.slices["model"]]
+
+    @property
+    def gains(self) -> Array:
+        """Return the numbers of the law, flat."""
+        return self.numbers[self.parts.slices["gains"]]
+
+    def with_numbers(self, values: Mapping[str, ArrayLike], only: str | None = None) -> Self:
+        """Return the problem with the named numbers, in every part that has them or in the `only` one."""
+        return dataclasses.replace(self, numbers=self.parts.replaced(self.numbers, values, only))
+
+
+@dataclass(frozen=True, eq=False)
+class SampledProblem(Problem):
+    """A closed loop in which the law runs once per period.
+
+    Attributes
+    ----------
+    controller: The law with tank, governor and estimators.
+    period, delay, jitter: [s].
+    missed: Share of periods in which the law does not run.
+    allow_unstable: Whether to run a loop that is unstable by the limit map.
+    held: Motor torque at the start (n,).
+    gain_changes: Of K_x and D_x, in the order of time.
+    feedforward: Wrenches (6,) that the end effector is to exert.
+    """
+
+    controller: SampledController
+    period: float
+    delay: float
+    jitter: float
+    missed: float
+    allow_unstable: bool
+    held: Array
+    gain_changes: tuple[GainChange, ...]
+    feedforward: tuple[Lasting, ...]
+
+    @cached_property
+    def loop(self) -> SampledLoop:
+        """Return the loop that runs."""
+        return SampledLoop(self.controller, self.elements)
+
+    @property
+    def parts(self) -> Parts:
+        """Return whose the numbers are."""
+        return self.loop.parameters
+
+
+def require_sampled(problem: Problem) -> SampledProblem:
+    """Return a problem that has a control rate.
+
+    Raises
+    ------
+    ValueRangeError
+        If it has none.
+    """
+    if not isinstance(problem, SampledProblem):
+        raise ValueRangeError(
+            "the scenario has no control rate", got=problem.name, needs="`control: {rate: …}`"
+        )
+    return problem

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
@@ -11,10 +13,11 @@ from passiflex.control.law import AbstractLaw, ImpedanceLaw
 from passiflex.control.rigid import RigidImpedanceLaw
 from passiflex.control.task import PoseTask, PositionTask
 from passiflex.errors import ArgumentError, SizeError, ValueRangeError
+from passiflex.loops.closed_loop import ClosedLoop
 from passiflex.problems.gains import law_gains, tank_gains, tank_start
 from passiflex.problems.posture import SINGULAR, held_jacobian, posture
-from passiflex.problems.problem import Noise, Problem
-from passiflex.problems.sampling import sampling
+from passiflex.problems.problem import Noise, Problem, SampledProblem
+from passiflex.problems.sampling import Known, elements_of, sampled_parts
 from passiflex.problems.timeline import timeline
 from passiflex.robots.flexible import FlexibleJointRobot
 from passiflex.scenarios.law_settings import RigidSettings
@@ -82,26 +85,33 @@ def resolve(scenario: Scenario, robot: FlexibleJointRobot | None = None) -> Prob
     home = posture(robot, shaped, model).pose
     # The law's own damping goes by the robot as described; its weight is the true one.
     start = at_start._replace(mass_matrix=posture(robot, q, described).mass_matrix)
-    return Problem(
-        name=scenario.name,
-        law=law,
-        plant=robot.layout.pack(plant),
-        model=robot.layout.pack(model),
-        gains=law.layout.pack(gains),
-        tank_gains=tank_gains(scenario),
-        q=q,
-        theta=theta,
-        home=home,
-        tank=tank_start(scenario),
-        events=timeline(scenario, home),
-        noise=Noise(scenario.noise.torque_variance, scenario.noise.hold) if scenario.noise else None,
-        duration=scenario.duration,
-        output_interval=scenario.output_interval,
-        tolerance=scenario.tolerance,
-        seed=scenario.seed,
-        configuration=scenario.to_yaml(),
-        sampling=sampling(scenario, law, plant, model, gains, q, start) if scenario.control else None,
-    )
+    known = Known(elements_of(scenario, robot), plant, model, q, start)
+    common: dict[str, Any] = {
+        "name": scenario.name,
+        "law": law,
+        "elements": known.elements,
+        "q": q,
+        "theta": theta,
+        "home": home,
+        "tank": tank_start(scenario),
+        "events": timeline(scenario, home),
+        "noise": Noise(scenario.noise.torque_variance, scenario.noise.hold) if scenario.noise else None,
+        "duration": scenario.duration,
+        "output_interval": scenario.output_interval,
+        "tolerance": scenario.tolerance,
+        "seed": scenario.seed,
+        "text": scenario.to_yaml(),
+    }
+    if scenario.control is not None:
+        return SampledProblem(**common, **sampled_parts(scenario, scenario.control, law, gains, known))
+    loop = ClosedLoop(law, known.elements)
+    values: dict[str, dict[str, Any]] = {
+        "plant": loop.plant.numbers(plant),
+        "model": model,
+        "gains": gains,
+        "tank": tank_gains(scenario),
+    }
+    return Problem(**common, numbers=loop.parameters.pack(values))
 
 
 def _checked(scenario: Scenario) -> Scenario:

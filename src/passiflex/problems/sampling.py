@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from passiflex.control.law import AbstractLaw
 from passiflex.control.tank import NO_CAP
+from passiflex.elements import MotorFriction
 from passiflex.errors import SizeError
-from passiflex.loops.plant import touching
+from passiflex.loops.plant import Elements
 from passiflex.loops.sampled_loop import SampledLoop
 from passiflex.problems.gains import sized
 from passiflex.problems.posture import Posture
-from passiflex.problems.problem import GainChange, Lasting, Sampling
+from passiflex.problems.problem import GainChange, Lasting
 from passiflex.robots.flexible import FlexibleJointRobot
 from passiflex.sampled.controller import SampledController
 from passiflex.sampled.external import (
@@ -58,26 +59,34 @@ VELOCITY_GAIN, ACCELERATION_GAIN = 0.3, 0.05
 torque's noise and the lag in q̇, which acts as further inertia; from 0.2 on the second gain destabilises."""
 
 
-def sampling(
-    scenario: Scenario,
-    law: AbstractLaw,
-    plant: dict[str, Array],
-    model: dict[str, Array],
-    gains: dict[str, Array],
-    q: Array,
-    start: Posture,
-) -> Sampling:
-    """Return how the law of a scenario runs on its robot.
+class Known(NamedTuple):
+    """What of a problem is known before its loop.
+
+    Attributes
+    ----------
+    plant, model: Numbers of the robot, and of it as the law takes it for, by name.
+    q: Start (n,).
+    start: The arm there: its weight is the true one, its inertia that of the description.
+    """
+
+    elements: Elements
+    plant: dict[str, Array]
+    model: dict[str, Array]
+    q: Array
+    start: Posture
+
+
+def sampled_parts(
+    scenario: Scenario, control: Control, law: AbstractLaw, gains: dict[str, Array], known: Known
+) -> dict[str, Any]:
+    """Return what a sampled problem has beside one in continuous time.
 
     Raises
     ------
     SizeError
         For a list of numbers that does not fit the robot's joints.
     """
-    control = scenario.control
-    assert control is not None
-    robot = law.robot
-    tank = scenario.tank
+    tank, robot, model = scenario.tank, law.robot, known.model
     controller = SampledController(
         law,
         TANKS[tank.kind or "port"]() if tank and law.has_tank else None,
@@ -86,51 +95,60 @@ def sampling(
         actions=scenario.actions is not None or bool(scenario.feedforward),
     )
     motors, sensors = scenario.motors or MotorSettings(), scenario.sensors or SensorSettings()
-    friction: dict[str, Any] = {
-        "coulomb_friction": _joints(robot, "motors.coulomb_friction", motors.coulomb_friction),
-        "viscous_friction": _joints(robot, "motors.viscous_friction", motors.viscous_friction),
-        "friction_width": motors.friction_width,
-    }
-    elements = touching(
-        friction=any(np.any(friction[f"{kind}_friction"]) for kind in ("coulomb", "viscous")),
-        drag=any(d.viscous or d.dry for d in scenario.environment),
+    moved = np.diag(known.start.mass_matrix) + gains.get("shaped_inertia", model["motor_inertia"])
+    loop = SampledLoop(controller, known.elements)
+    numbers = loop.parameters.pack(
+        {
+            "plant": loop.plant.numbers(known.plant),
+            "model": model,
+            "gains": gains,
+            "fallback": _fallback(control, scenario, robot, model, gains),
+            "tank": _tank(tank),
+            "actions": _actions(scenario.actions or Actions(), robot, known.q, moved),
+            "observer": {"bandwidth": _pole(control.observer_bandwidth)},
+            "inner": {
+                "period": 1 / control.rate,
+                "velocity_gain": VELOCITY_GAIN,
+                "acceleration_gain": ACCELERATION_GAIN,
+            },
+            "errors": _errors(control, sensors, scenario.noise, robot),
+            "sensors": _sensors(sensors, robot),
+            "limits": _limits(motors, robot),
+        }
     )
-    parts = SampledLoop(controller, elements).parameters
-    moved = np.diag(start.mass_matrix) + gains.get("shaped_inertia", model["motor_inertia"])
-    numbers = parts.pack(
-        plant=plant | friction,
-        model=model,
-        gains=gains,
-        fallback=_fallback(control, scenario, robot, model, gains),
-        tank=_tank(tank),
-        actions=_actions(scenario.actions or Actions(), robot, q, moved),
-        observer={"bandwidth": _pole(control.observer_bandwidth)},
-        inner={
-            "period": 1 / control.rate,
-            "velocity_gain": VELOCITY_GAIN,
-            "acceleration_gain": ACCELERATION_GAIN,
-        },
-        errors=_errors(control, sensors, scenario.noise, robot),
-        sensors=_sensors(sensors, robot),
-        limits=_limits(motors, robot),
-    )
-    return Sampling(
-        controller=controller,
-        elements=elements,
-        period=1 / control.rate,
-        delay=control.delay,
-        jitter=control.jitter,
-        missed=control.missed,
-        allow_unstable=control.allow_unstable,
-        numbers=numbers,
-        plant=numbers[parts.slices["plant"]],
-        held=start.gravity_torque,
-        gains=_gain_changes(scenario, gains),
-        feedforward=tuple(
+    return {
+        "controller": controller,
+        "numbers": numbers,
+        "period": 1 / control.rate,
+        "delay": control.delay,
+        "jitter": control.jitter,
+        "missed": control.missed,
+        "allow_unstable": control.allow_unstable,
+        "held": known.start.gravity_torque,
+        "gain_changes": _gain_changes(scenario, gains),
+        "feedforward": tuple(
             Lasting(f.start, f.end, np.array([*f.force, *f.moment])) for f in scenario.feedforward
         ),
-        drags=tuple(Lasting(d.start, d.end, np.array([d.viscous, d.dry])) for d in scenario.environment),
+    }
+
+
+def elements_of(scenario: Scenario, robot: FlexibleJointRobot) -> Elements:
+    """Return what touches a scenario's robot: each kind once, friction first, whose books a sampled run always has.
+
+    Raises
+    ------
+    SizeError
+        For friction of another number of joints.
+    """
+    motors = scenario.motors or MotorSettings()
+    coulomb, viscous = (
+        _joints(robot, f"motors.{name}", getattr(motors, name))
+        for name in ("coulomb_friction", "viscous_friction")
     )
+    rubs = bool(np.any(coulomb) or np.any(viscous))
+    friction = MotorFriction(rubs, coulomb, viscous, motors.friction_width)
+    others = {e.structure: e for e in (s.build() for s in scenario.environment if s.acts)}
+    return (*[friction] * (rubs or scenario.control is not None), *others.values())
 
 
 def _joints(robot: FlexibleJointRobot, name: str, value: ArrayLike) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from fractions import Fraction
 
 import numpy as np
@@ -9,20 +10,25 @@ from numpy.typing import NDArray
 
 from passiflex.control.motion import Motion, Pose, hold, pose_at
 from passiflex.problems.problem import Event
-from passiflex.scenarios.scenario import Force, Scenario
+from passiflex.scenarios.scenario import Scenario
 
 Array = NDArray[np.float64]
 
 
 def timeline(scenario: Scenario, home: Pose) -> tuple[Event, ...]:
-    """Return the events in the order of time: each change of the reference or of the wrench is one."""
+    """Return the events in the order of time: each change of the reference or of what acts on the robot is one."""
     motions = _motions(scenario, home)
-    wrenches = _wrenches(scenario)
-    times = sorted({0.0, *motions, *(t for t in wrenches if t < scenario.duration)})
-    acting, events = np.zeros(6), []
-    for time in times:
-        acting = wrenches.get(time, acting)
-        events.append(Event(time, motions.get(time), acting.copy()))
+    wrenches = _summed([(f.start, f.end, (*f.force, *f.moment)) for f in scenario.forces])
+    touching = [entry for entry in scenario.environment if entry.acts]
+    names = sorted({name for entry in touching for name in entry.inputs})
+    lasting = [(e.start, e.end, tuple(e.inputs.get(n, 0.0) for n in names)) for e in touching]
+    inputs = _summed(lasting)
+    times = {t for changes in (wrenches, inputs) for t in changes if t < scenario.duration}
+    acting, felt, events = np.zeros(6), np.zeros(len(names)), []
+    for time in sorted({0.0, *motions, *times}):
+        acting, felt = wrenches.get(time, acting), inputs.get(time, felt)
+        named = {name: float(value) for name, value in zip(names, felt, strict=True)}
+        events.append(Event(time, motions.get(time), acting.copy(), named))
     return tuple(events)
 
 
@@ -36,19 +42,18 @@ def _motions(scenario: Scenario, home: Pose) -> dict[float, Motion]:
     return motions
 
 
-def _wrenches(scenario: Scenario) -> dict[float, Array]:
-    """Return the wrench that acts from each instant on at which a force begins or ends.
+def _summed(lasting: Sequence[tuple[float, float, tuple[float, ...]]]) -> dict[float, Array]:
+    """Return the sum of what acts from each instant on at which something begins or ends.
 
-    Its numbers are rounded sums of all that act: kept as fractions, a force leaves nothing behind when it ends.
+    Its numbers are rounded sums of all that act: kept as fractions, nothing is left behind by what has ended.
     """
-    changes: dict[float, list[tuple[int, Force]]] = {}
-    for force in scenario.forces:
-        changes.setdefault(force.start, []).append((1, force))
-        changes.setdefault(force.end, []).append((-1, force))
-    acting, out = [Fraction(0)] * 6, {}
+    changes: dict[float, list[tuple[int, tuple[float, ...]]]] = {}
+    for start, end, numbers in lasting:
+        changes.setdefault(start, []).append((1, numbers))
+        changes.setdefault(end, []).append((-1, numbers))
+    acting, out = [Fraction(0)] * len(lasting[0][2]) if lasting else [], {}
     for time in sorted(changes):
-        for sign, force in changes[time]:
-            parts = (*force.force, *force.moment)
-            acting = [sum_ + sign * Fraction(part) for sum_, part in zip(acting, parts, strict=True)]
+        for sign, numbers in changes[time]:
+            acting = [sum_ + sign * Fraction(part) for sum_, part in zip(acting, numbers, strict=True)]
         out[time] = np.array([float(part) for part in acting])
     return out

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from passiflex.problems.problem import Problem
+from passiflex.problems.problem import Problem, SampledProblem
 from passiflex.sampled.external import NoTorque
 
 UNKNOWN = "model error and noise"
@@ -21,31 +21,21 @@ def unbooked(problem: Problem) -> str:
     The rigid law shapes the inertia of the end effector, which no storage of its own accounts for; without
     the force on it that is not even a passive wish. It measures no joint torque, so that noise is none of it.
     """
-    s, rigid = problem.sampling, not problem.law.shapes
+    s, rigid = problem if isinstance(problem, SampledProblem) else None, not problem.law.shapes
     causes = []
     if rigid:
         blind = s is not None and isinstance(s.controller.external, NoTorque)
         causes.append(SHAPED + " without force sensing" * blind)
     elif s is not None:
         causes.append("sampling")
-    if not np.array_equal(problem.plant, problem.model):
+    if not np.array_equal(problem.plant[: problem.model.size], problem.model):
         causes.append("model error")
     if problem.noise is not None and problem.noise.variance > 0 and not rigid:
         causes.append("noise")
-    if _rubs(problem):
-        causes.append("friction of the motors")
+    causes += [e.unknown for e in problem.elements if e.acts and e.unknown]
     return listed(causes) or NOTHING
 
 
 def listed(words: list[str], last: str = "and") -> str:
     """Return words as people list them: a, b and c."""
     return f" {last} ".join([", ".join(words[:-1]), words[-1]]) if len(words) > 1 else "".join(words)
-
-
-def _rubs(problem: Problem) -> bool:
-    """Return whether the motors have friction, which the law is not told of."""
-    s = problem.sampling
-    if s is None:
-        return False
-    friction = s.plant[problem.law.robot.layout.size :]
-    return bool(np.any(friction[: 2 * problem.law.robot.n]))

@@ -12,6 +12,7 @@ import casadi as cs
 from passiflex.control.law import AbstractLaw, Stored
 from passiflex.control.signals import Measurement, Reference
 from passiflex.layout import Field, Layout
+from passiflex.parts import Parts
 from passiflex.robots.arm import EndEffectorPose
 from passiflex.sampled.actions import action_layout, posture_spring, tracking_wrench
 from passiflex.sampled.external import AbstractExternalTorque, Known, TrueTorque
@@ -57,13 +58,22 @@ class SampledController:
     """Whether anything acts that the valve gates: without, a third of the arithmetic is left out."""
 
     @cached_property
-    def parameters(self) -> tuple[Layout, ...]:
-        """Return the layouts of `ControlParameters`, in its order."""
+    def parameters(self) -> Parts:
+        """Return the layouts of `ControlParameters`, by the names of its parts."""
         robot, gains = self.law.robot, self.law.layout
         observer = Layout((Field("bandwidth", (), "rad/s", "of the external torque's estimator"),))
         actions = action_layout(robot.n)
-        tank, inner, errors = AbstractTank.layout, AbstractInnerLoop.layout, error_layout(robot.n)
-        return robot.layout, gains, gains, tank, actions, observer, inner, errors
+        layouts = ControlParameters(
+            model=robot.layout,
+            gains=gains,
+            fallback=gains,
+            tank=AbstractTank.layout,
+            actions=actions,
+            observer=observer,
+            inner=AbstractInnerLoop.layout,
+            errors=error_layout(robot.n),
+        )
+        return Parts(layouts._asdict())
 
     @cached_property
     def state(self) -> Layout:
@@ -85,7 +95,7 @@ class SampledController:
         elapsed: cs.SX,
         applied: cs.SX,
         state: cs.SX,
-        p: ControlParameters,
+        p: ControlParameters[SimpleNamespace],
     ) -> PeriodResult:
         """Return command, next state and ledger entry, `elapsed` seconds after the last period that ran.
 
@@ -206,7 +216,7 @@ class SampledController:
         level: cs.SX,
         doubt: cs.SX,
         elapsed: cs.SX,
-        p: ControlParameters,
+        p: ControlParameters[SimpleNamespace],
     ) -> _Granted:
         """Return the reference as far as the tank surely pays for it; a law that has fallen back holds its own."""
         one = cs.SX(1)
@@ -246,7 +256,7 @@ class SampledController:
         setpoint: Setpoint,
         granted: _Granted,
         g: SimpleNamespace,
-        p: ControlParameters,
+        p: ControlParameters[SimpleNamespace],
     ) -> cs.SX:
         """Return the torque of everything that only the tank's valve lets through (n,) N m."""
         arm, rows = self.law.robot.arm, slice(0, self.law.task.size)

@@ -39,6 +39,14 @@ class AbstractInnerLoop(abc.ABC):
     def state(self, n: int) -> Layout:
         """Return what is remembered from one period to the next."""
 
+    def takes(self, law: AbstractLaw) -> bool:
+        """Return whether it works with a law."""
+        return True
+
+    def expecting(self, late: int) -> AbstractInnerLoop:
+        """Return the inner loop for commands that are so many periods late; the same where it does not predict."""
+        return self
+
     def start(self, at: Rest) -> Remembered:
         """Return what is remembered at rest, of each field of the state."""
         return self.state(at.q.size).zeros()

@@ -65,6 +65,14 @@ class MatchedInnerLoop(AbstractInnerLoop):
 
     late: int = 1
 
+    def takes(self, law: AbstractLaw) -> bool:
+        """Return whether it is the paper's law, which is taken apart."""
+        return isinstance(law, ImpedanceLaw)
+
+    def expecting(self, late: int) -> MatchedInnerLoop:
+        """Return the same over another delay."""
+        return self if late == self.late else MatchedInnerLoop(late)
+
     def state(self, n: int) -> Layout:
         """Return the last readings, the estimates, and the torques that are on their way."""
         return Layout(

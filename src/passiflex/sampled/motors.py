@@ -1,4 +1,4 @@
-"""What motors make of a command: torque and torque-rate limits; and their friction."""
+"""What motors make of a command: torque and torque-rate limits."""
 
 from __future__ import annotations
 
@@ -26,19 +26,3 @@ def limited(command: cs.SX, last: cs.SX, torque_limit: cs.SX, rate_limit: cs.SX,
     reached = cs.fmin(cs.fmax(command, last - step), last + step)
     reached = cs.if_else(rate_limit < UNLIMITED_TORQUE, reached, command)
     return cs.fmin(cs.fmax(reached, -torque_limit), torque_limit)
-
-
-def friction_layout(n: int) -> Layout:
-    """Return the parameters of the friction."""
-    return Layout(
-        (
-            Field("coulomb_friction", (n,), "N m", "at the motors, seen from the link"),
-            Field("viscous_friction", (n,), "N m s/rad", "at the motors, seen from the link"),
-            Field("friction_width", (), "rad/s", "speed over which Coulomb friction changes its sign"),
-        )
-    )
-
-
-def friction(dtheta: cs.SX, coulomb: cs.SX, viscous: cs.SX, width: cs.SX) -> cs.SX:
-    """Return the friction torque against θ̇ (n,) N m; it never gives power: each entry has the sign of θ̇."""
-    return coulomb * cs.tanh(dtheta / width) + viscous * dtheta

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-from typing import NamedTuple
+from typing import Generic, NamedTuple, TypeVar
 
 import casadi as cs
 
@@ -70,8 +69,11 @@ class PeriodResult(NamedTuple):
     believed: Measurement
 
 
-class ControlParameters(NamedTuple):
-    """Views of everything that is a run-time number of the controller.
+P = TypeVar("P")
+
+
+class ControlParameters(NamedTuple, Generic[P]):
+    """Everything that is a run-time number of the controller, as layouts or as views of them.
 
     Attributes
     ----------
@@ -85,11 +87,11 @@ class ControlParameters(NamedTuple):
     errors: `error_layout`, what the sensors may get wrong.
     """
 
-    model: SimpleNamespace
-    gains: SimpleNamespace
-    fallback: SimpleNamespace
-    tank: SimpleNamespace
-    actions: SimpleNamespace
-    observer: SimpleNamespace
-    inner: SimpleNamespace
-    errors: SimpleNamespace
+    model: P
+    gains: P
+    fallback: P
+    tank: P
+    actions: P
+    observer: P
+    inner: P
+    errors: P

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field
 
 from passiflex.scenarios.spans import TimeSpan
 from passiflex.texts.quantity import Quantity
+
+if TYPE_CHECKING:  # who reads a scenario needs no CasADi
+    from passiflex.elements import AbstractElement
 
 
 class Drag(TimeSpan):
@@ -18,9 +21,20 @@ class Drag(TimeSpan):
     viscous: Annotated[float, Quantity("N s/m", least=0)] = Field(default=0.0, description="N s/m")
     dry: Annotated[float, Quantity("N", least=0)] = Field(default=0.0, description="against the motion, N")
 
+    def build(self) -> AbstractElement:
+        """Return the element."""
+        from passiflex.elements import Drag
+
+        return Drag()
+
+    @property
+    def acts(self) -> bool:
+        """Return whether it does anything."""
+        return any(self.inputs.values())
+
     @property
     def inputs(self) -> dict[str, float]:
-        """Return the inputs of `loops.elements.Drag` while it lasts."""
+        """Return the inputs of the element while it lasts."""
         return {"viscous_drag": self.viscous, "dry_drag": self.dry}
 
 

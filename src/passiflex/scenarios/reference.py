@@ -12,7 +12,7 @@ from passiflex.scenarios.spans import Instant, Seconds
 from passiflex.texts.quantity import Quantity, shown
 from passiflex.texts.section import Section
 
-if TYPE_CHECKING:
+if TYPE_CHECKING:  # who reads a scenario needs no CasADi
     from passiflex.control.motion import Motion, Pose
 
 Vector = tuple[float, ...]

@@ -17,7 +17,7 @@ from passiflex.loops.recorded import sample_parts
 from passiflex.loops.sampled_loop import SampledLoop
 from passiflex.loops.witness import Noted
 from passiflex.native import Change, LaneFunctions, LaneInputs, LaneLoop, find_compiler
-from passiflex.problems.problem import Problem
+from passiflex.problems.problem import Problem, SampledProblem
 from passiflex.problems.unbooked import unbooked
 from passiflex.runs.run import Recorded, Run, assemble
 from passiflex.simulation.schedule import Chance, Scheduled, schedule
@@ -102,25 +102,23 @@ def digest_batch(
     NameUnknownError
         For a signal that there is not.
     """
-    for problem in problems:
-        if problem.sampling is None:
-            raise SimulationError(f"{problem.name!r} has no control rate", needs="`control: {rate: …}`")
+    sampled = [_sampled(problem) for problem in problems]
     if find_compiler() is None:
-        return [digest(i, _alone(problem, keep)) for i, problem in enumerate(problems)]
+        return [digest(i, _alone(problem, keep)) for i, problem in enumerate(sampled)]
     groups: defaultdict[Hashable, list[int]] = defaultdict(list)
-    steps = [longest_step(p, _compiled(p).plant) for p in problems]
-    for i, problem in enumerate(problems):
+    steps = [longest_step(p, _compiled(p).plant) for p in sampled]
+    for i, problem in enumerate(sampled):
         groups[_alike(problem)].append(i)
     jobs = []
     for group in groups.values():
-        loop = lane_loop(problems[group[0]], width)
+        loop = lane_loop(sampled[group[0]], width)
         group.sort(key=lambda i: steps[i])  # lanes that take as many steps as each other wait for none
         jobs += [(loop, group[i : i + loop.width]) for i in range(0, len(group), loop.width)]
 
     def run(job: tuple[LaneLoop, list[int]]) -> list[tuple[int, T]]:
         loop, members = job
         longest = np.array([steps[i] for i in members])
-        recordings = _advance(loop, [problems[i] for i in members], longest, keep)
+        recordings = _advance(loop, [sampled[i] for i in members], longest, keep)
         return [(i, digest(i, recording)) for i, recording in zip(members, recordings, strict=True)]
 
     with ThreadPoolExecutor(threads) as pool:
@@ -128,10 +126,15 @@ def digest_batch(
     return [found[i] for i in range(len(problems))]
 
 
-def lane_loop(problem: Problem, width: int | None = None) -> LaneLoop:
+def _sampled(problem: Problem) -> SampledProblem:
+    if not isinstance(problem, SampledProblem):
+        raise SimulationError(f"{problem.name!r} has no control rate", needs="`control: {rate: …}`")
+    return problem
+
+
+def lane_loop(problem: SampledProblem, width: int | None = None) -> LaneLoop:
     """Return the native lanes for problems of this structure; from the process, the cache on disk, or compiled now."""
-    assert problem.sampling is not None
-    key = (structure(problem.sampling.loop), width)
+    key = (structure(problem.loop), width)
     if key not in _lane_loops:
         loop = _compiled(problem).loop
         functions = LaneFunctions(
@@ -141,19 +144,16 @@ def lane_loop(problem: Problem, width: int | None = None) -> LaneLoop:
     return _lane_loops[key]
 
 
-def _compiled(problem: Problem) -> CompiledSampledLoop:
-    assert problem.sampling is not None
-    return compiled_sampled_loop(problem.sampling.loop)
+def _compiled(problem: SampledProblem) -> CompiledSampledLoop:
+    return compiled_sampled_loop(problem.loop)
 
 
-def _alike(problem: Problem) -> Hashable:
+def _alike(problem: SampledProblem) -> Hashable:
     """Return what problems have in common that can share lanes."""
-    s = problem.sampling
-    assert s is not None
-    return structure(s.loop), s.period, problem.duration, problem.output_interval
+    return structure(problem.loop), problem.period, problem.duration, problem.output_interval
 
 
-def _alone(problem: Problem, keep: Sequence[str]) -> Recording:
+def _alone(problem: SampledProblem, keep: Sequence[str]) -> Recording:
     run = simulate_unchecked(problem)
     known = [str(name) for name, signal in run.data.data_vars.items() if "time" in signal.dims]
     for name in keep:
@@ -165,17 +165,16 @@ def _alone(problem: Problem, keep: Sequence[str]) -> Recording:
 
 
 def _advance(
-    lanes: LaneLoop, problems: list[Problem], longest: Array, keep: Sequence[str]
+    lanes: LaneLoop, problems: list[SampledProblem], longest: Array, keep: Sequence[str]
 ) -> list[Recording]:
     """Return the recordings of at most as many problems as there are lanes; lanes left over repeat the last."""
     filled = [*problems, *[problems[-1]] * (lanes.width - len(problems))]
     longest = np.concatenate([longest, np.full(lanes.width - len(problems), longest[-1])])
     compiled = _compiled(problems[0])
-    s = problems[0].sampling
-    assert s is not None
+    s = problems[0]
     every = round(problems[0].output_interval / s.period)
     columns, shapes = _columns(lanes, compiled.loop, keep)
-    numbers = [p.sampling for p in map(charged, filled) if p.sampling is not None]
+    numbers = [charged(p) for p in filled]
     p_plant = np.stack([n.plant for n in numbers], axis=1)
     p_control = np.stack([n.numbers for n in numbers], axis=1)
     witness = compiled.loop.witness
@@ -259,7 +258,7 @@ def _columns(
 
 
 def _recording(
-    problem: Problem,
+    problem: SampledProblem,
     values: Array,
     shapes: dict[str, tuple[slice, tuple[int, ...]]],
     ended: int,
@@ -268,19 +267,17 @@ def _recording(
     noted: Noted,
 ) -> Recording:
     """Return what was kept of one lane; energies may leave the finite numbers before states do."""
-    s = problem.sampling
-    assert s is not None
-    every = round(problem.output_interval / s.period)
+    every = round(problem.output_interval / problem.period)
     count = len(values) if ended == samples else max(1, min(whole, ended // every + 1))
     signals = {
         name: values[:count, columns].reshape(count, *shape) for name, (columns, shape) in shapes.items()
     }
-    time = np.arange(count, dtype=np.float64) * (s.period * every)
-    failure = "" if ended == samples else left_finite(ended * s.period)
+    time = np.arange(count, dtype=np.float64) * (problem.period * every)
+    failure = "" if ended == samples else left_finite(ended * problem.period)
     return Recording(signals, time, failure, problem.law.has_tank, unbooked(problem), noted.values)
 
 
-def simulate_in_lane(problem: Problem) -> Run:
+def simulate_in_lane(problem: SampledProblem) -> Run:
     """Return the whole run of a sampled problem with the very numbers that it has in a batch.
 
     `simulate` gives the same but for rounding, which a sensor's resolution or an unstable loop makes visible.

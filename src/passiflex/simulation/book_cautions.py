@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import dataclasses
-
 import numpy as np
 from numpy.typing import NDArray
 
-from passiflex.problems.altered import altered, replaced
-from passiflex.problems.problem import Problem
+from passiflex.problems.altered import altered
+from passiflex.problems.problem import Problem, SampledProblem
 from passiflex.stability.linear_loop import LinearLoop
 from passiflex.stability.noise_credit import POSTURES, REACH, noise_credit
 
@@ -22,13 +20,15 @@ HELD = 20.0
 
 def book_cautions(problem: Problem) -> tuple[str, ...]:
     """Return what noise, offset and missed periods leave of the tank's books, a line each, with remedies that help."""
-    s = problem.sampling
-    if s is None or s.controller.tank is None or not s.controller.tank.measures:
+    if not isinstance(problem, SampledProblem):
+        return ()
+    tank = problem.controller.tank
+    if tank is None or not tank.measures:
         return ()
     return (*_noise(problem), *_offset(problem), *_missed(problem))
 
 
-def _noise(problem: Problem) -> tuple[str, ...]:
+def _noise(problem: SampledProblem) -> tuple[str, ...]:
     power, tank = POSTURES * noise_credit(problem), problem.tank
     if power * problem.duration <= tank.floor or problem.noise is None:
         return ()
@@ -39,7 +39,7 @@ def _noise(problem: Problem) -> tuple[str, ...]:
     )
 
 
-def _lighter(problem: Problem, power: float) -> str:
+def _lighter(problem: SampledProblem, power: float) -> str:
     """Return a shaped inertia that at least halves the credit, found by trying; or what else there is."""
     law, model = problem.law, problem.law.robot.layout.unpack(problem.model)
     if law.shapes:
@@ -52,11 +52,8 @@ def _lighter(problem: Problem, power: float) -> str:
     return "try less noise at low frequencies, or a fuller tank (tank.initial)"
 
 
-def _offset(problem: Problem) -> tuple[str, ...]:
-    s = problem.sampling
-    assert s is not None
-    parts = s.loop.parameters
-    offset = parts.unpack("errors", s.numbers)["torque_offset"]
+def _offset(problem: SampledProblem) -> tuple[str, ...]:
+    offset = problem.parts.unpack("errors", problem.numbers)["torque_offset"]
     given, floor = float(offset.sum()) * REACH, problem.tank.floor
     if given <= floor:
         return ()
@@ -67,21 +64,19 @@ def _offset(problem: Problem) -> tuple[str, ...]:
     )
     if problem.law.robot.n > problem.law.task.size and _moved_by(problem, offset).max() >= REACH:
         held = {"posture_stiffness": np.full(problem.law.robot.n, HELD)}
-        numbers = replaced(parts, s.numbers, held, "actions")
-        changed = dataclasses.replace(problem, sampling=dataclasses.replace(s, numbers=numbers))
+        changed = problem.with_numbers(held, "actions")
         text += "; it also moves a self-motion that nothing holds"
         if _moved_by(changed, offset).max() < REACH:
             text += f" (actions.posture_stiffness: {HELD:g} N m/rad holds it while the valve is open)"
     return (text,)
 
 
-def _moved_by(problem: Problem, offset: Array) -> Array:
+def _moved_by(problem: SampledProblem, offset: Array) -> Array:
     """Return |q − q₀| (n,) at the end of the run for the worst signs of an offset (n,), by the linear loop."""
-    assert problem.sampling is not None
     loop = LinearLoop(problem)
     driven = loop.driven()
     answer, power = driven.G, driven.A
-    for _ in range(max(1, int(np.log2(problem.duration / problem.sampling.period)))):
+    for _ in range(max(1, int(np.log2(problem.duration / problem.period)))):
         answer, power = answer + power @ answer, power @ power
         if np.abs(answer[: loop.n]).max() * offset.max() > REACH:
             break
@@ -89,11 +84,11 @@ def _moved_by(problem: Problem, offset: Array) -> Array:
     return moved
 
 
-def _missed(problem: Problem) -> tuple[str, ...]:
-    s, noise = problem.sampling, problem.noise
-    if s is None or not s.missed or noise is None or not noise.variance:
+def _missed(problem: SampledProblem) -> tuple[str, ...]:
+    noise = problem.noise
+    if not problem.missed or noise is None or not noise.variance:
         return ()
     return (
-        f"{s.missed:.0%} of the periods are missed while the torque sensors are noisy: what goes through the joints "
-        "between two readings is only bounded (measurement_bound of the run), and nothing is granted on it",
+        f"{problem.missed:.0%} of the periods are missed while the torque sensors are noisy: what goes through the "
+        "joints between two readings is only bounded (measurement_bound of the run), and nothing is granted on it",
     )

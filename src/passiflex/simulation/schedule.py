@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from passiflex.control.motion import Motion
 from passiflex.loops.period_row import PeriodRow
 from passiflex.native import NativeFunction
-from passiflex.problems.problem import Event, Problem
+from passiflex.problems.problem import Event, SampledProblem
 
 Array = NDArray[np.float64]
 
@@ -26,18 +26,14 @@ class Scheduled(NamedTuple):
     numbers: Array
 
 
-def schedule(problem: Problem, row: PeriodRow) -> list[Scheduled]:
+def schedule(problem: SampledProblem, row: PeriodRow) -> list[Scheduled]:
     """Return what is told to the loop, in the order of time; each takes effect at the first sample at or after it."""
-    s = problem.sampling
-    assert s is not None
-    times = {e.time for e in problem.events} | {c.start for c in s.gains}
-    times |= {t for i in (*s.feedforward, *s.drags) for t in (i.start, i.end)}
-    firsts = sorted({_first_period(t, s.period) for t in times})
-    return [
-        Scheduled(k, _told(problem, row, k * s.period))
-        for k in firsts
-        if k * s.period <= problem.duration + NOW
-    ]
+    period = problem.period
+    times = {e.time for e in problem.events} | {c.start for c in problem.gain_changes}
+    times |= {t for i in problem.feedforward for t in (i.start, i.end)}
+    firsts = sorted({_first_period(t, period) for t in times})
+    within = (k for k in firsts if k * period <= problem.duration + NOW)
+    return [Scheduled(k, _in_force(problem, row, k * period)) for k in within]
 
 
 class Chance:
@@ -47,9 +43,8 @@ class Chance:
     the others.
     """
 
-    def __init__(self, problem: Problem, row: PeriodRow):
-        assert problem.sampling is not None
-        self.problem, self.s, self.row = problem, problem.sampling, row
+    def __init__(self, problem: SampledProblem, row: PeriodRow):
+        self.problem, self.row = problem, row
         streams = np.random.SeedSequence(problem.seed).spawn(3)
         self.noise, self.late, self.lost = (np.random.default_rng(s) for s in streams)
         self.since = 1  # periods since the law last ran
@@ -58,23 +53,25 @@ class Chance:
     def take(self, first: int, count: int) -> tuple[Array, Array]:
         """Return what is drawn (count, n) and timing (count, 2) for the periods from number `first` on, in order."""
         runs: Array = np.ones(count)
-        if self.s.missed:
-            runs[self.lost.random(count) < self.s.missed] = 0.0
+        if self.problem.missed:
+            runs[self.lost.random(count) < self.problem.missed] = 0.0
         if first == 0:
             runs[0] = 1.0
-        delay = self.s.delay + (self.s.jitter * self.late.random(count) if self.s.jitter else 0.0)
+        delay = self.problem.delay + (
+            self.problem.jitter * self.late.random(count) if self.problem.jitter else 0.0
+        )
         drawn = np.zeros((count, self.row.drawn.size))
         at = self.row.drawn.slices
         if self.problem.noise is not None:
             drawn[:, at["torque_noise"]] = self._noise(first, count)
-        drawn[:, at["elapsed"]] = (self._elapsed(runs) * self.s.period)[:, None]
+        drawn[:, at["elapsed"]] = (self._elapsed(runs) * self.problem.period)[:, None]
         return drawn, np.column_stack([np.broadcast_to(delay, count), runs])
 
     def _noise(self, first: int, count: int) -> Array:
         """Return the noise of each period; a sample of it may last for several."""
         assert self.problem.noise is not None
         deviation, hold = math.sqrt(self.problem.noise.variance), self.problem.noise.hold
-        lasting = round(hold / self.s.period)
+        lasting = round(hold / self.problem.period)
         which = np.arange(first, first + count) // lasting
         begun = len(self.held)  # the first sample began in the chunk before
         fresh = self.noise.normal(0.0, deviation, size=(which[-1] - which[0] + 1 - begun, self.row.n))
@@ -94,9 +91,8 @@ class Chance:
 class PeriodRows:
     """The rows of one run, made chunk by chunk."""
 
-    def __init__(self, problem: Problem, row: PeriodRow, function: NativeFunction):
-        assert problem.sampling is not None
-        self.period, self.function = problem.sampling.period, function
+    def __init__(self, problem: SampledProblem, row: PeriodRow, function: NativeFunction):
+        self.period, self.function = problem.period, function
         self.chance, self.schedule = Chance(problem, row), schedule(problem, row)
 
     def take(self, first: int, count: int) -> tuple[Array, Array]:
@@ -122,33 +118,27 @@ def _first_period(time: float, period: float) -> int:
     return k
 
 
-def _told(problem: Problem, row: PeriodRow, time: float) -> Array:
-    s, gains = problem.sampling, problem.law.layout.unpack(problem.gains)
-    assert s is not None
+def _in_force(problem: SampledProblem, row: PeriodRow, time: float) -> Array:
+    gains = problem.law.layout.unpack(problem.gains)
     so_far = tuple(e for e in problem.events if e.time <= time + NOW)
     motion, began = _motion(so_far)
-    changes = [c for c in s.gains if c.start <= time + NOW]
+    changes = [c for c in problem.gain_changes if c.start <= time + NOW]
     old = changes[-2] if len(changes) > 1 else None
     new = changes[-1] if changes else None
+    pushing = (i.numbers for i in problem.feedforward if i.start <= time + NOW < i.end)
     values: dict[str, Any] = {
+        **row.environment.zeros(),
+        **so_far[-1].environment,
         **motion,
         "began": began,
-        "F_e": so_far[-1].F_e,
-        "viscous_drag": 0.0,
-        "dry_drag": 0.0,
-        "feedforward": np.zeros(6),
+        "feedforward": sum(pushing, np.zeros(6)),
         "change_from": new.start if new else -1.0,
         "change_to": new.end if new else 0.0,
     }
     for name in ("stiffness", "damping"):
         values[f"old_{name}"] = getattr(old, name) if old else gains[name]
         values[f"new_{name}"] = getattr(new, name) if new else gains[name]
-    for interval in (i for i in s.feedforward if i.start <= time + NOW < i.end):
-        values["feedforward"] = values["feedforward"] + interval.numbers
-    for interval in (i for i in s.drags if i.start <= time + NOW < i.end):
-        for name, number in zip(("viscous_drag", "dry_drag"), interval.numbers, strict=True):
-            values[name] = values[name] + number
-    return row.schedule.pack(values)
+    return row.schedule.pack({f.name: values[f.name] for f in row.schedule})
 
 
 def _motion(events: tuple[Event, ...]) -> tuple[Motion, float]:

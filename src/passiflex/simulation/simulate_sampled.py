@@ -11,7 +11,7 @@ from passiflex.loops.recorded import sample_parts
 from passiflex.loops.witness import Noted
 from passiflex.native import LoopState, NativeFunction, fastest_pole
 from passiflex.native.stability import STABILITY_LIMIT
-from passiflex.problems.problem import Problem
+from passiflex.problems.problem import SampledProblem
 from passiflex.runs.run import Recorded, Run, assemble
 from passiflex.simulation.schedule import NOW, PeriodRows
 from passiflex.stability.admissible import require_stable
@@ -28,7 +28,7 @@ MOST_STEPS = 200_000_000
 """Steps of one run at most, about two minutes."""
 
 
-def simulate_sampled(problem: Problem) -> Run:
+def simulate_sampled(problem: SampledProblem) -> Run:
     """Return the run of a sampled problem.
 
     A run that leaves the finite numbers ends there, and says so in `Run.failure`.
@@ -42,31 +42,27 @@ def simulate_sampled(problem: Problem) -> Run:
     return simulate_unchecked(problem)
 
 
-def simulate_unchecked(problem: Problem) -> Run:
+def simulate_unchecked(problem: SampledProblem) -> Run:
     """Return the run of a sampled problem, stable or not."""
-    assert problem.sampling is not None
-    return _record(charged(problem), compiled_sampled_loop(problem.sampling.loop))
+    return _record(charged(problem), compiled_sampled_loop(problem.loop))
 
 
-def start(problem: Problem, compiled: CompiledSampledLoop) -> LoopState:
+def start(problem: SampledProblem, compiled: CompiledSampledLoop) -> LoopState:
     """Return the loop at rest at its start, with the reference where the end effector is."""
-    s = problem.sampling
-    assert s is not None
     at, gains = standing(problem), problem.law.layout.unpack(problem.gains)
     rest = at_rest(problem, at, problem.home, gains["stiffness"], problem.tank.initial, running=0.0)
-    zero = np.zeros(problem.law.robot.n)
-    x = np.concatenate([problem.q, problem.theta, zero, zero])
-    return compiled.held.start(x, compiled.loop.start(rest), s.held)
+    x = compiled.loop.plant.at_rest(problem.q, problem.theta)
+    return compiled.held.start(x, compiled.loop.start(rest), problem.held)
 
 
-def longest_step(problem: Problem, plant: NativeFunction) -> float:
+def longest_step(problem: SampledProblem, plant: NativeFunction) -> float:
     """Return the longest step that resolves the plant's fastest pole at the start, with the worst drag."""
-    s = problem.sampling
-    assert s is not None
-    zero = np.zeros(problem.law.robot.n)
-    x = np.concatenate([problem.q, problem.theta, zero, zero])
-    worst = np.sum([d.numbers for d in s.drags], axis=0) if s.drags else np.zeros(2)
-    pole = fastest_pole(plant, x, np.concatenate([s.held, np.zeros(6), worst]), s.plant)
+    layout = problem.loop.plant.environment
+    x = problem.loop.plant.at_rest(problem.q, problem.theta)
+    worst = layout.zeros()
+    for event in problem.events:
+        worst |= {name: np.maximum(worst[name], value) for name, value in event.inputs.items()}
+    pole = fastest_pole(plant, x, np.concatenate([problem.held, layout.pack(worst)]), problem.plant)
     longest = RESOLVED * STABILITY_LIMIT / pole
     if problem.duration / longest > MOST_STEPS:
         raise SimulationError(
@@ -77,12 +73,10 @@ def longest_step(problem: Problem, plant: NativeFunction) -> float:
     return longest
 
 
-def sample_count(problem: Problem) -> int:
+def sample_count(problem: SampledProblem) -> int:
     """Return the number of samples of a whole run, the first and the last included."""
-    s = problem.sampling
-    assert s is not None
-    periods = problem.duration / s.period
-    whole = abs(periods - round(periods)) < NOW / s.period
+    periods = problem.duration / problem.period
+    whole = abs(periods - round(periods)) < NOW / problem.period
     return (round(periods) if whole else int(periods)) + 1
 
 
@@ -91,17 +85,16 @@ def left_finite(time: float) -> str:
     return f"the state left the finite numbers {time:.4g} s after the start"
 
 
-def _record(problem: Problem, compiled: CompiledSampledLoop) -> Run:
-    s, loop, held = problem.sampling, compiled.loop, compiled.held
-    assert s is not None
+def _record(problem: SampledProblem, compiled: CompiledSampledLoop) -> Run:
+    loop, held = compiled.loop, compiled.held
     state = start(problem, compiled)
     longest = longest_step(problem, compiled.plant)
-    every = round(problem.output_interval / s.period)
+    every = round(problem.output_interval / problem.period)
     rows = PeriodRows(problem, loop.period, compiled.row)
     chunks: list[list[Array]] = []
     samples, failure = sample_count(problem), ""
     witness = loop.witness
-    p_watch = np.concatenate([s.numbers, witness.numbers(problem.law.robot, problem.tank.initial)])
+    p_watch = np.concatenate([problem.numbers, witness.numbers(problem.law.robot, problem.tank.initial)])
     chunk = max(1, CHUNK // every) * every
     for first in range(0, samples, chunk):
         count = min(chunk, samples - first)
@@ -110,9 +103,9 @@ def _record(problem: Problem, compiled: CompiledSampledLoop) -> Run:
             state,
             told,
             timing,
-            s.plant,
-            s.numbers,
-            s.period,
+            problem.plant,
+            problem.numbers,
+            problem.period,
             longest,
             every,
             last=first + count == samples,
@@ -124,27 +117,26 @@ def _record(problem: Problem, compiled: CompiledSampledLoop) -> Run:
         parts = (done.x, done.quads, done.controller, done.command, done.signals, told[::every])
         chunks.append([part[:good] for part in parts])
         if done.completed < count:
-            failure = left_finite((first + done.completed) * s.period)
+            failure = left_finite((first + done.completed) * problem.period)
             break
     seen = [np.vstack(part) for part in zip(*chunks, strict=True)]
     return _assemble(problem, compiled, seen, failure, witness.noted(state.watched))
 
 
 def _assemble(
-    problem: Problem, compiled: CompiledSampledLoop, seen: list[Array], failure: str, noted: Noted
+    problem: SampledProblem, compiled: CompiledSampledLoop, seen: list[Array], failure: str, noted: Noted
 ) -> Run:
-    s, parts = problem.sampling, sample_parts(compiled.loop)
-    assert s is not None
+    parts = sample_parts(compiled.loop)
     x, _, _, command, _, rows = seen
     felt = slice(0, compiled.loop.plant.environment.size)
-    truth = np.asarray(compiled.outputs.map(x, command, rows[:, felt], s.numbers), dtype=float)
+    truth = np.asarray(compiled.outputs.map(x, command, rows[:, felt], problem.numbers), dtype=float)
     everything = [*seen[:-1], truth, rows]
     count = _whole_rows(everything) if failure else len(x)
     recorded = []
     for layout, numbers in zip(parts.values(), everything, strict=True):
         recorded.append(Recorded(layout.kept, numbers[:count, layout.columns(lambda f: f.kept)]))
-    every = round(problem.output_interval / s.period)
-    time: Array = np.arange(count, dtype=np.float64) * (s.period * every)
+    every = round(problem.output_interval / problem.period)
+    time: Array = np.arange(count, dtype=np.float64) * (problem.period * every)
     return assemble(problem, time, recorded, [], failure, noted)
 
 

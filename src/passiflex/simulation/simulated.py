@@ -9,7 +9,7 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from passiflex.control.law import AbstractLaw
-from passiflex.loops.elements import AbstractElement
+from passiflex.elements import AbstractElement
 from passiflex.problems.own_parts import with_parts
 from passiflex.problems.resolution import resolve
 from passiflex.runs.run import Run

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,11 +11,11 @@ from numpy.typing import NDArray
 from passiflex.control.motion import MOTION, Motion, Pose, between, hold, pose_at, shifted
 from passiflex.control.tank import jump_cost
 from passiflex.errors import SimulationError
-from passiflex.loops.closed_loop import ENERGIES
+from passiflex.loops.closed_loop import ClosedLoop
 from passiflex.loops.compiled import CompiledLoop, compiled_loop
 from passiflex.native import Watched, fastest_pole
 from passiflex.native.stability import STABILITY_LIMIT
-from passiflex.problems.problem import Event, Problem
+from passiflex.problems.problem import Event, Problem, SampledProblem
 from passiflex.runs.run import Recorded, Run, assemble
 from passiflex.simulation.integrate import (
     CHECK,
@@ -51,13 +52,13 @@ def simulate_problem(problem: Problem) -> Run:
     SimulationError
         If the start is not finite, or the events do not fit the noise's hold time.
     """
-    return simulate_sampled(problem) if problem.sampling else _Simulation(problem).run()
+    return simulate_sampled(problem) if isinstance(problem, SampledProblem) else _Simulation(problem).run()
 
 
 class _Record:
     """Rows of the result: times, and what is known of states, energies and inputs at them."""
 
-    def __init__(self, problem: Problem, states: int, inputs: int):
+    def __init__(self, problem: Problem, states: int, energies: int, inputs: int):
         count = int(problem.duration / problem.output_interval + NOW)
         if count > MOST_ROWS:
             raise SimulationError(
@@ -67,7 +68,7 @@ class _Record:
         if problem.duration - self.time[-1] > NOW:
             self.time = np.append(self.time, problem.duration)
         self.states = np.full((self.time.size, states), np.nan)
-        self.energies = np.full((self.time.size, ENERGIES.size), np.nan)
+        self.energies = np.full((self.time.size, energies), np.nan)
         self.inputs = np.zeros((self.time.size, inputs))
 
     def put(self, rows: NDArray[np.intp] | int, states: Array, energies: Array) -> None:
@@ -84,31 +85,22 @@ class _Simulation:
 
     def __init__(self, problem: Problem):
         self.problem = problem
-        self.compiled: CompiledLoop = compiled_loop(problem.law)
+        self.compiled: CompiledLoop = compiled_loop(ClosedLoop(problem.law, problem.elements))
         loop = self.compiled.loop
         self.state_slices = loop.state.slices
-        self.p = problem.parameters
+        self.p = problem.numbers
         self.noise = self._draw_noise(loop.law.robot.n)
         self.planned: Motion = hold(problem.home)  # until the first event, which may be a jump
         self.motion = self.planned
         self.began = 0.0
-        zero = np.zeros(loop.law.robot.n)
-        self.x = loop.state.pack(
-            {
-                "q": problem.q,
-                "theta": problem.theta,
-                "dq": zero,
-                "dtheta": zero,
-                "tank_energy": problem.tank.initial,
-                "clock": 0.0,
-            }
-        )
-        self.energies = np.zeros(ENERGIES.size)
+        own: dict[str, Any] = {"q": problem.q, "theta": problem.theta, "tank_energy": problem.tank.initial}
+        self.x = loop.state.pack(loop.state.zeros() | own)
+        self.energies = np.zeros(loop.energies.size)
         witness = loop.witness
         limits = witness.numbers(problem.law.robot, problem.tank.initial)
         self.watched = Watched(np.zeros(witness.memory.size), np.concatenate([self.p, limits]))
         self.log: list[dict[str, float | str]] = []
-        self.record = _Record(problem, self.x.size, loop.inputs.size)
+        self.record = _Record(problem, self.x.size, loop.energies.size, loop.inputs.size)
 
     def run(self) -> Run:
         """Return the run."""
@@ -145,7 +137,7 @@ class _Simulation:
         loop = self.compiled.loop
         recorded = [
             Recorded(loop.state, states),
-            Recorded(ENERGIES, energies, "_energy"),
+            Recorded(loop.energies, energies, "_energy"),
             Recorded(loop.output_layout, outputs),
         ]
         noted = loop.witness.noted(self.watched.memory)
@@ -170,8 +162,7 @@ class _Simulation:
 
     def _inputs(self, event: Event) -> Array:
         layout = self.compiled.loop.inputs
-        noise = np.zeros(self.compiled.loop.law.robot.n)
-        return layout.pack({**self.motion, "F_e": event.F_e, "torque_noise": noise})
+        return layout.pack({**layout.zeros(), **self.motion, **event.environment})
 
     def _integrate(self, event: Event, u: Array, instants: Array) -> Stretch:
         problem, stepper = self.problem, self.compiled.fixed_step
@@ -222,8 +213,7 @@ class _Simulation:
         x = self.x.copy()
         x[self.state_slices["clock"]] = clock
         layout = self.compiled.loop.inputs
-        still = {"F_e": np.zeros(6), "torque_noise": np.zeros(self.compiled.loop.law.robot.n)}
-        y = self.compiled.outputs(x, layout.pack({**motion, **still}), self.p)
+        y = self.compiled.outputs(x, layout.pack({**layout.zeros(), **motion}), self.p)
         return float(y[self.compiled.loop.output_layout.slices["cartesian_spring_energy"]][0])
 
     def _move_reference(self, motion: Motion, time: float) -> None:
@@ -260,12 +250,13 @@ class _Simulation:
             if reached(1.0)[2] > budget:
                 share = _largest(lambda s: reached(s)[2] <= budget)
         motion, stored, cost = reached(share)
+        energies = self.compiled.loop.energies.slices
         if self.problem.law.has_tank:
             after = float(self.x[level][0]) - cost
             self.x[level] = min(after, max(tank.cap, float(self.x[level][0])))
-            self.energies[ENERGIES.slices["drawn"]] += cost
-            self.energies[ENERGIES.slices["spilled"]] += after - float(self.x[level][0])
-        self.energies[ENERGIES.slices["reference"]] += stored
+            self.energies[energies["drawn"]] += cost
+            self.energies[energies["spilled"]] += after - float(self.x[level][0])
+        self.energies[energies["reference"]] += stored
         if abs(stored) > NOTHING or share < 1:
             self.log.append({"time": time, "event": "reference jump", "stored_J": stored, "share": share})
         return motion

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from passiflex.control.motion import Motion, Pose, between, hold, pose_at
 from passiflex.control.task import PoseTask
 from passiflex.control.turning import held_angle, largest_moment, turning_moment
-from passiflex.problems.problem import Problem
+from passiflex.problems.problem import Problem, SampledProblem
 
 Array = NDArray[np.float64]
 
@@ -85,8 +85,8 @@ def _instants(problem: Problem) -> Iterator[_Instant]:
     if not isinstance(problem.law.task, PoseTask) or not any(i >= 3 for i in problem.law.task.held):
         return
     gains = problem.law.layout.unpack(problem.gains)
-    changes = problem.sampling.gains if problem.sampling else ()
-    pushes = problem.sampling.feedforward if problem.sampling else ()
+    sampled = problem if isinstance(problem, SampledProblem) else None
+    changes, pushes = (sampled.gain_changes, sampled.feedforward) if sampled else ((), ())
     times = {e.time for e in problem.events} | {t for p in pushes for t in (p.start, p.end)}
     times |= {t for c in changes for t in (c.start, c.end)}
     motion: Motion = hold(problem.home)

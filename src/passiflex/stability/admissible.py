@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from passiflex.errors import UnstableLoopError
 from passiflex.problems.altered import altered
-from passiflex.problems.problem import Problem
+from passiflex.problems.problem import Problem, SampledProblem
 from passiflex.stability.causes import Advice, advise
 from passiflex.stability.clock_words import delay_words, hertz
 from passiflex.stability.judgement import Judgement, judge, judged_fallback
@@ -122,9 +122,8 @@ def check(problem: Problem, rate: float | None = None, delay: float | None = Non
         For a problem in continuous time, or a rate or delay that makes no sense.
     """
     changed = altered(problem, rate=rate, delay=delay)
-    assert changed.sampling is not None
     found, loop = judge(changed), LinearLoop(changed)
-    period, late = loop.s.period, changed.sampling.delay
+    period, late = changed.period, changed.delay
     K_ratio, B_ratio = _ratios(changed)
     shaped, nan = changed.law.shapes, math.nan
     return Admissible(
@@ -141,7 +140,7 @@ def check(problem: Problem, rate: float | None = None, delay: float | None = Non
     )
 
 
-def require_stable(problem: Problem) -> None:
+def require_stable(problem: SampledProblem) -> None:
     """Raise unless the judge lets the problem pass. Who insists is let go on if the fallback holds.
 
     Raises
@@ -149,8 +148,7 @@ def require_stable(problem: Problem) -> None:
     UnstableLoopError
         With cause, number and remedies that were tried.
     """
-    assert problem.sampling is not None
-    allow_unstable = problem.sampling.allow_unstable
+    allow_unstable = problem.allow_unstable
     found = judged_fallback(problem) if allow_unstable else judge(problem)
     if found is None or found.stable:
         return

@@ -51,8 +51,7 @@ def advise(problem: Problem, found: Judgement) -> Advice:
     """Return the advice for a problem that does not hold."""
     trial = Trial(problem, found)
     mode, T = found.spectrum, 1 / found.rate
-    assert problem.sampling is not None
-    own = min(found.delay, problem.sampling.delay)
+    own = min(found.delay, trial.loop.problem.delay)
     late = delay_words(own / T)
     if found.delay > own:
         late += f" and {counted((found.delay - own) / T, 'jitter')}"
@@ -85,14 +84,14 @@ def _time(seconds: float) -> str:
 
 def _reasons(t: Trial) -> Iterator[str]:
     """Yield what, taken away, makes the loop hold: the rarest first."""
-    s, gains, joint = t.loop.s, t.gains, t.found.spectrum.joint
+    s, gains, joint = t.loop.problem, t.gains, t.found.spectrum.joint
     late = t.found.delay
     if t.found.missed:
         yield "periods that are missed let a torque act for longer than this loop bears"
     if s.jitter and late > s.delay and t.stable(late=s.delay):
         yield "commands that the jitter makes later than the law knows"
     if _is_self_motion(t):
-        stiff = t.loop.parts.actions.unpack(_actions(t.loop))["posture_stiffness"]
+        stiff = t.loop.parts.unpack("actions", t.loop.problem.numbers)["posture_stiffness"]
         yield (
             "a self-motion, by the spring to a posture"
             if stiff.any()
@@ -135,7 +134,7 @@ def _is_self_motion(t: Trial) -> bool:
     """Return whether the end effector hardly moves in the mode that grows."""
     case = t.cases[0]
     J = t.loop.task_jacobian
-    modes = Modes.of(case.loop.matrix(None, t.found.delay, case.gains), t.loop.s.period, J)
+    modes = Modes.of(case.loop.matrix(None, t.found.delay, case.gains), t.loop.problem.period, J)
     if not self_motions(J):
         return False
     worst = int(np.argmax(np.where(modes.drifting, 0, np.abs(modes.values))))
@@ -145,9 +144,9 @@ def _is_self_motion(t: Trial) -> bool:
 
 def _bare_flange(t: Trial) -> bool:
     """Return whether a heavier last body makes the loop hold."""
-    heavier = LinearLoop(with_flange(t.problem, TOOL), native=False)
+    heavier = LinearLoop(with_flange(t.loop.problem, TOOL), native=False)
     return t.found.part == "law" and heavier.radius(delay=t.found.delay) < 1
 
 
 def _actions(loop: LinearLoop) -> np.ndarray:
-    return loop.s.numbers[loop.parts.slices["actions"]]
+    return loop.problem.numbers[loop.parts.slices["actions"]]

@@ -10,7 +10,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
-from passiflex.errors import ValueRangeError
 from passiflex.problems.problem import Problem
 from passiflex.stability.law_slope import Gains
 from passiflex.stability.linear_loop import LinearLoop
@@ -62,17 +61,13 @@ def judge(problem: Problem) -> Judgement:
     ValueRangeError
         For a problem in continuous time.
     """
-    if problem.sampling is None:
-        raise ValueRangeError(
-            "the scenario has no control rate", got=problem.name, needs="`control: {rate: …}`"
-        )
     loop = LinearLoop(problem)
     cases = [*law_cases(loop), *fallback_cases(loop)]
     worst = _worst(cases)
     found = _of(worst)
     if found.stable:  # then it is the law's own motion that is of interest
         found = _of(_worst([c for c in cases if c.part != "fallback"]))
-    missed = problem.sampling.missed
+    missed = loop.problem.missed
     if found.stable and missed:
         for case in cases:
             if not dies_out(case.loop, missed, case.delay, case.gains):
@@ -86,7 +81,7 @@ def holds(problem: Problem, *, native: bool = True) -> bool:
     Where it is not compiled yet and native is not wanted, nothing is compiled for it.
     """
     loop = LinearLoop(problem, native=native)
-    missed = loop.s.missed
+    missed = loop.problem.missed
     return all(
         c.loop.radius(delay=c.delay, gains=c.gains) < 1
         and (not missed or dies_out(c.loop, missed, c.delay, c.gains))
@@ -99,7 +94,7 @@ def judged_fallback(problem: Problem) -> Judgement | None:
     cases = list(fallback_cases(LinearLoop(problem)))
     if not cases:
         return None
-    found, missed = _of(_worst(cases)), cases[0].loop.s.missed
+    found, missed = _of(_worst(cases)), cases[0].loop.problem.missed
     for case in cases if found.stable and missed else ():
         if not dies_out(case.loop, missed, case.delay, case.gains):
             return _of(case, missed)
@@ -108,16 +103,16 @@ def judged_fallback(problem: Problem) -> Judgement | None:
 
 def law_cases(loop: LinearLoop) -> Iterator[Case]:
     """Yield the law's own gains and those that it goes over to, at both ends of the jitter."""
-    s = loop.s
+    s = loop.problem
     for delay in sorted({s.delay, s.delay + s.jitter}):
         yield Case("law", loop, delay, {})
-        for change in s.gains:
+        for change in s.gain_changes:
             yield Case("gains", loop, delay, {"stiffness": change.stiffness, "damping": change.damping})
 
 
 def fallback_cases(loop: LinearLoop) -> Iterator[Case]:
     """Yield the fallback at both ends of the jitter, if the tank has one; the valve is shut by then."""
-    s, tank = loop.s, loop.s.controller.tank
+    s, tank = loop.problem, loop.problem.controller.tank
     if tank is None or not tank.falls_back:
         return
     alone, gains = loop.without_actions(), loop.fallback()
@@ -131,4 +126,4 @@ def _worst(cases: list[Case]) -> Case:
 
 def _of(case: Case, missed: float = 0.0) -> Judgement:
     spectrum = case.loop.spectrum(delay=case.delay, gains=case.gains)
-    return Judgement(spectrum, case.part, 1 / case.loop.s.period, case.delay, missed)
+    return Judgement(spectrum, case.part, 1 / case.loop.problem.period, case.delay, missed)

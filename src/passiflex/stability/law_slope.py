@@ -11,8 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from passiflex.loops.compiled import CompiledSampledLoop
 from passiflex.loops.sampled_loop import SampledLoop
-from passiflex.problems.altered import replaced
-from passiflex.problems.problem import Problem
+from passiflex.problems.problem import SampledProblem
 from passiflex.sampled.motors import UNLIMITED_TORQUE
 from passiflex.stability.loop_at_rest import AT_REST, AtRest, Standing, loop_at_rest
 
@@ -42,20 +41,19 @@ class LawSlope:
 
     Attributes
     ----------
-    x: Where the robot stands (4n,).
+    x: Where the robot stands (N,).
     remembered: Which numbers of the memory act back.
     numbers: Flat parameters of the period, with what has no linear approximation left out.
     """
 
-    def __init__(self, problem: Problem, at: Standing, compiled: CompiledSampledLoop):
-        assert problem.sampling is not None
+    def __init__(self, problem: SampledProblem, at: Standing, compiled: CompiledSampledLoop):
         self.problem, self.at, self.compiled = problem, at, compiled
         self.parts = compiled.loop.parameters
-        numbers = np.concatenate([at.plant, problem.sampling.numbers[at.plant.size :]])
-        self.numbers = replaced(self.parts, numbers, IDEAL)
+        numbers = np.concatenate([at.plant, problem.numbers[at.plant.size :]])
+        self.numbers = self.parts.replaced(numbers, IDEAL)
         self.remembered = _acting(compiled.loop)
         self.n = problem.law.robot.n
-        self.x = np.concatenate([at.q, at.theta, np.zeros(2 * self.n)])
+        self.x = compiled.loop.plant.at_rest(at.q, at.theta)
         self._known: dict[tuple[float, float, Key], Array] = {}
         self._rest: tuple[tuple[float, Key], AtRest] | None = None
 
@@ -69,20 +67,20 @@ class LawSlope:
         return self._known[key]
 
     def torque(self, at: Standing) -> Array:
-        """Return ∂τ_a/∂x (n, 4n) of a robot, as these sensors have it before their noise."""
-        plant = self.parts.plant.unpack(at.plant)
+        """Return ∂τ_a/∂x (n, N) of a robot, as these sensors have it before their noise."""
+        plant = self.parts["plant"].unpack(at.plant)
         sensors = self.parts.unpack("sensors", self.numbers)
         seen = 1 + sensors["torque_scale"]
         K, D = np.diag(seen * plant["joint_stiffness"]), np.diag(seen * plant["joint_damping"])
-        return np.hstack([-K, K, -D, D])
+        return np.hstack([-K, K, -D, D, np.zeros((self.n, self.x.size - 4 * self.n))])
 
     def _differences(self, period: float, elapsed: float, gains: Gains) -> Array:
         control, told = self.compiled.control, self.compiled.loop.row.slices["torque_noise"]
-        own = self.parts.gains.unpack(self.problem.gains) | {k: np.asarray(v) for k, v in gains.items()}
+        own = self.parts["gains"].unpack(self.problem.gains) | {k: np.asarray(v) for k, v in gains.items()}
         memory, row, phi = self._at_rest(own, elapsed)
-        numbers = replaced(self.parts, self.numbers, own, "gains")
-        numbers = replaced(self.parts, numbers, {"period": period}, "inner")
-        numbers = replaced(self.parts, numbers, {"posture": phi}, "actions")  # at rest, that spring is slack
+        numbers = self.parts.replaced(self.numbers, own, "gains")
+        numbers = self.parts.replaced(numbers, {"period": period}, "inner")
+        numbers = self.parts.replaced(numbers, {"posture": phi}, "actions")  # at rest, that spring is slack
         n_x, n_c = self.x.size, self.remembered.size
 
         def evaluate(points: Array) -> Array:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Sequence
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -10,11 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from passiflex.errors import ValueRangeError
 from passiflex.loops.compiled import compiled_sampled_loop, interpreted_sampled_loop
-from passiflex.problems.altered import replaced
 from passiflex.problems.posture import held_jacobian
-from passiflex.problems.problem import Problem
+from passiflex.problems.problem import Problem, require_sampled
 from passiflex.stability.exponential import exponential
 from passiflex.stability.law_slope import Gains, LawSlope, differences
 from passiflex.stability.loop_at_rest import Standing, standing
@@ -60,17 +57,14 @@ class LinearLoop:
     """
 
     def __init__(self, problem: Problem, at: Standing | None = None, *, native: bool = True):
-        if problem.sampling is None:
-            raise ValueRangeError(
-                "the scenario has no control rate", got=problem.name, needs="`control: {rate: …}`"
-            )
-        self.problem, self.s, self.at = problem, problem.sampling, at or standing(problem)
+        self.problem = s = require_sampled(problem)
+        self.at = at or standing(s)
         self.native = native
         build = compiled_sampled_loop if native else interpreted_sampled_loop
-        self.compiled = build(problem.sampling.loop)
+        self.compiled = build(s.loop)
         self.n = problem.law.robot.n
         self.parts = self.compiled.loop.parameters
-        self.law = LawSlope(problem, self.at, self.compiled)
+        self.law = LawSlope(s, self.at, self.compiled)
         self.remembered, self.x = self.law.remembered, self.law.x
         self._flows: dict[float, tuple[Array, Array]] = {}
         self._kin: LinearLoop | None = None
@@ -79,7 +73,7 @@ class LinearLoop:
         self, period: float | None = None, delay: float | None = None, gains: Gains | None = None
     ) -> Spectrum:
         """Return the dominant mode; period and delay [s] and gains are the problem's own unless given."""
-        T = self.s.period if period is None else period
+        T = self.problem.period if period is None else period
         modes = Modes.of(self.matrix(period, delay, gains), T, self.task_jacobian)
         return modes.dominant(self.n, self.kinetic)
 
@@ -87,13 +81,13 @@ class LinearLoop:
         self, period: float | None = None, delay: float | None = None, gains: Gains | None = None
     ) -> float:
         """Return the spectral radius alone, in half the time; drift is no part of it."""
-        T = self.s.period if period is None else period
+        T = self.problem.period if period is None else period
         return Modes.radius_of(self.matrix(period, delay, gains), T, self.task_jacobian)
 
     def trembling(self, delay: float, gains: Gains, settling: float) -> float:
         """Return the radius of what trembles, as `Modes.trembling_of` has it."""
         matrix = self.matrix(None, delay, gains)
-        return Modes.trembling_of(matrix, self.s.period, self.task_jacobian, settling)
+        return Modes.trembling_of(matrix, self.problem.period, self.task_jacobian, settling)
 
     def matrix(
         self,
@@ -168,14 +162,11 @@ class LinearLoop:
     def without_actions(self) -> LinearLoop:
         """Return the loop with the tank's valve shut."""
         still = {"posture_stiffness": np.zeros(self.n)}
-        numbers = replaced(self.parts, self.s.numbers, still, "actions")
-        sampling = dataclasses.replace(self.s, numbers=numbers)
-        problem = dataclasses.replace(self.problem, sampling=sampling)
-        return LinearLoop(problem, self.at, native=self.native)
+        return LinearLoop(self.problem.with_numbers(still, "actions"), self.at, native=self.native)
 
     def fallback(self) -> dict[str, Array]:
         """Return the gains of the law that takes over when the tank is overdrawn."""
-        return self.parts.unpack("fallback", self.s.numbers)
+        return self.parts.unpack("fallback", self.problem.numbers)
 
     def beside(self, at: Standing) -> LinearLoop:
         """Return the loop of another robot at the same posture, which makes its law's derivative from this one's.
@@ -194,7 +185,7 @@ class LinearLoop:
         return np.asarray(by_torque @ (law.torque(at) - law.torque(self.at)))
 
     def by_plant(self, timing: Timing, left: NDArray[Any], ran: NDArray[Any]) -> NDArray[Any]:
-        """Return the derivative of leftᴴ `flow` ran by the entries of [A B] of the plant (m, 4n, 5n).
+        """Return the derivative of leftᴴ `flow` ran by the entries of [A B] of the plant (m, N, N + n).
 
         With ẋ = A x + B u it is ∫ p (x, u)ᵀ dt, where ṗ = −Aᵀ p leads to `left` at the period's end; by Gauss's
         quadrature. Columns of `left` and of `ran`, what the law leaves of a vector, go in pairs.
@@ -218,14 +209,13 @@ class LinearLoop:
         return out
 
     def plants(self, others: Sequence[Standing]) -> Array:
-        """Return [A B] of other robots, or of this one elsewhere (N, 4n, 5n): all by one call of compiled code."""
-        where = [np.concatenate([at.q, at.theta, np.zeros(2 * self.n), at.held]) for at in others]
+        """Return [A B] of other robots, or of this one elsewhere (M, N, N + n): all by one call of compiled code."""
+        plant = self.compiled.loop.plant
+        where = [np.concatenate([plant.at_rest(at.q, at.theta), at.held]) for at in others]
         points, steps = zip(*(differences(x) for x in where), strict=True)
         rows = np.vstack(points)
         numbers = np.repeat([self._smooth(at) for at in others], len(points[0]), axis=0)
-        u = np.hstack(
-            [rows[:, self.x.size :], np.zeros((len(rows), self.compiled.loop.plant.environment.size))]
-        )
+        u = np.hstack([rows[:, self.x.size :], np.zeros((len(rows), plant.environment.size))])
         values = self.compiled.plant.map(rows[:, : self.x.size], u, numbers)[0]
         split = values.reshape(len(others), 2, len(steps[0]), -1)
         change = (split[:, 0] - split[:, 1]) / (2 * np.array(steps))[:, :, None]
@@ -241,7 +231,7 @@ class LinearLoop:
     @property
     def kinetic(self) -> Array:
         """Return the inertia of links and motors (2n,): what each joint moves, the others held [kg m²]."""
-        motors = self.parts.plant.unpack(self.at.plant)["motor_inertia"]
+        motors = self.parts["plant"].unpack(self.at.plant)["motor_inertia"]
         return np.concatenate([np.diag(self.at.arm.mass_matrix), motors])
 
     @property
@@ -250,8 +240,8 @@ class LinearLoop:
         return self.x.size + self.remembered.size
 
     def _timing(self, period: float | None, delay: float | None, lined: int = 0) -> Timing:
-        T = self.s.period if period is None else period
-        return Timing.of(T, self.s.delay if delay is None else delay, lined)
+        T = self.problem.period if period is None else period
+        return Timing.of(T, self.problem.delay if delay is None else delay, lined)
 
     @cached_property
     def plant(self) -> Array:
@@ -260,7 +250,7 @@ class LinearLoop:
 
     def _smooth(self, at: Standing) -> Array:
         """Return a robot's numbers without dry friction."""
-        layout = self.parts.plant
+        layout = self.parts["plant"]
         return layout.pack(layout.unpack(at.plant) | {"coulomb_friction": np.zeros(self.n)})
 
     def _held(self, time: float) -> tuple[Array, Array]:

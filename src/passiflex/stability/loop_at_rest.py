@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from passiflex.control.motion import Pose
-from passiflex.loops.plant import Plant
 from passiflex.loops.sampled_loop import SampledLoop
 from passiflex.problems.posture import Posture, posture
-from passiflex.problems.problem import Problem
+from passiflex.problems.problem import SampledProblem
 from passiflex.sampled.rest import Rest
 
 Array = NDArray[np.float64]
@@ -49,22 +48,22 @@ class AtRest(NamedTuple):
     phi: Array
 
 
-def standing(problem: Problem, q: Array | None = None, plant: Mapping[str, Array] | None = None) -> Standing:
+def standing(
+    problem: SampledProblem, q: Array | None = None, plant: Mapping[str, Array] | None = None
+) -> Standing:
     """Return the problem's robot at rest: at its start, or at another q; itself, or with other numbers (by name)."""
-    s = problem.sampling
-    assert s is not None
-    robot, layout = problem.law.robot, Plant(problem.law.robot).parameters
-    true = layout.unpack(s.plant) | dict(plant or {})
+    robot, layout = problem.law.robot, problem.parts["plant"]
+    true = layout.unpack(problem.plant) | dict(plant or {})
     where = problem.q if q is None else q
     here = posture(robot, where, true)
     if q is None and not plant:
-        return Standing(where, problem.theta, s.held, s.plant, here)
+        return Standing(where, problem.theta, problem.held, problem.plant, here)
     weight = here.gravity_torque
     return Standing(where, where + weight / true["joint_stiffness"], weight, layout.pack(true), here)
 
 
 def loop_at_rest(
-    problem: Problem,
+    problem: SampledProblem,
     loop: SampledLoop,
     gains: Mapping[str, ArrayLike],
     period: float,
@@ -72,7 +71,7 @@ def loop_at_rest(
 ) -> AtRest:
     """Return what a period finds and leaves unchanged, with the gains in place of the problem's and a full tank."""
     p, at = problem, at or standing(problem)
-    model = loop.parameters.model.unpack(p.model)
+    model = p.law.robot.layout.unpack(p.model)
     shaped = p.law.posture_at_rest(at.q, at.theta, model["joint_stiffness"], gains)
     home = posture(p.law.robot, shaped, model).pose
     rest = at_rest(p, at, home, gains["stiffness"], BRIMFUL, running=1.0)
@@ -87,11 +86,11 @@ def loop_at_rest(
 
 
 def at_rest(
-    problem: Problem, at: Standing, home: Pose, stiffness: ArrayLike, level: float, *, running: float
+    problem: SampledProblem, at: Standing, home: Pose, stiffness: ArrayLike, level: float, *, running: float
 ) -> Rest:
     """Return what the parts of a loop are told of where it rests: its reference at `home`, its tank at a level [J]."""
     robot = problem.law.robot
-    model, plant = robot.layout.unpack(problem.model), Plant(robot).parameters.unpack(at.plant)
+    model, plant = robot.layout.unpack(problem.model), robot.layout.unpack(at.plant)
     return Rest(
         running=running,
         q=at.q,

@@ -50,8 +50,8 @@ def dies_out(loop: LinearLoop, missed: float, delay: float | None = None, gains:
 
 def gaps(loop: LinearLoop, missed: float, delay: float | None = None, gains: Gains | None = None) -> Gaps:
     """Return the maps from run to run, and how likely they are."""
-    T = loop.s.period
-    timing = Timing.of(T, loop.s.delay if delay is None else delay, least=1)
+    T = loop.problem.period
+    timing = Timing.of(T, loop.problem.delay if delay is None else delay, least=1)
     count = max(1, math.ceil(math.log(LEFT_OUT) / math.log(missed))) if missed > 0 else 1
     flow, skip = loop.flow(timing), loop.misses(timing)
     maps, still = [], flow

@@ -6,14 +6,12 @@ E[nᵀ q̇] < 0, and a tank that books τ_aᵀ q̇ is credited with energy that 
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from passiflex.problems.altered import replaced
-from passiflex.problems.problem import Problem
+from passiflex.problems.problem import SampledProblem
 from passiflex.stability.linear_loop import DrivenLoop, LinearLoop
 
 POSTURES = 1.5
@@ -43,33 +41,31 @@ def mean_credit(loop: DrivenLoop, joints: int, variance: float, lasting: int) ->
     return -variance * float(np.trace((answer + before)[:joints])) / (2 * lasting)
 
 
-def noise_credit(problem: Problem) -> float:
+def noise_credit(problem: SampledProblem) -> float:
     """Return the mean power [W] that the noise of a sampled problem credits its tank with, ≥ 0.
 
     That of its gains, of those that it changes to, and of its fallback, the largest, at the start. Gains that
     are not stable have none. White noise, new in each period, is followed by no motion that it still could meet.
     """
-    s, noise = problem.sampling, problem.noise
-    if s is None or noise is None or not noise.variance:
+    noise = problem.noise
+    if noise is None or not noise.variance:
         return 0.0
-    lasting = round(noise.hold / s.period)
+    lasting = round(noise.hold / problem.period)
     if lasting <= 1:
         return 0.0
     loop = LinearLoop(problem)
-    later: list[Mapping[str, ArrayLike]] = [{"stiffness": c.stiffness, "damping": c.damping} for c in s.gains]
+    later: list[Mapping[str, ArrayLike]] = [
+        {"stiffness": c.stiffness, "damping": c.damping} for c in problem.gain_changes
+    ]
     powers = [
-        mean_credit(loop.driven(gains=gains), loop.n, noise.variance, lasting) / s.period
+        mean_credit(loop.driven(gains=gains), loop.n, noise.variance, lasting) / problem.period
         for gains in ({}, *later, loop.fallback())
         if loop.radius(gains=gains) < 1
     ]
     return max(0.0, *powers) if powers else 0.0
 
 
-def charged(problem: Problem) -> Problem:
+def charged(problem: SampledProblem) -> SampledProblem:
     """Return the sampled problem with the credit of its noise, `POSTURES` times, declared to its controller."""
-    s = problem.sampling
     credit = noise_credit(problem)
-    if s is None or not credit:
-        return problem
-    numbers = replaced(s.loop.parameters, s.numbers, {"noise_credit": POSTURES * credit}, "errors")
-    return dataclasses.replace(problem, sampling=dataclasses.replace(s, numbers=numbers))
+    return problem.with_numbers({"noise_credit": POSTURES * credit}, "errors") if credit else problem

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from passiflex.errors import PassiflexError
 from passiflex.problems.altered import altered, rewritten, with_flange
-from passiflex.problems.problem import Problem
+from passiflex.problems.problem import Problem, require_sampled
 from passiflex.problems.resolution import resolve
 from passiflex.sampled.matched_loop import MatchedInnerLoop
 from passiflex.scenarios.scenario_file import parse_scenario
@@ -56,7 +56,7 @@ def remedies(problem: Problem, found: Judgement) -> Iterator[Remedy]:
         for remedy in look(trial):
             if _is_new(problem, remedy) and _tried(problem, remedy):
                 yield remedy
-    if holds(with_flange(problem, TOOL), native=False):
+    if holds(with_flange(trial.loop.problem, TOOL), native=False):
         yield Remedy(f"a tool with an inertia of {TOOL:g} kg m² on the flange, in the robot's file too", {})
 
 
@@ -186,7 +186,7 @@ def _self_motion(t: Trial) -> Iterator[Remedy]:
 
 
 def _missed(t: Trial) -> Iterator[Remedy]:
-    now = t.loop.s.missed
+    now = t.loop.problem.missed
     share = next((s for s in SHARES if now and t.stable(missed=s * now)), None)
     if share is not None:
         words = f"at most {100 * share * now:.2g} % of the periods missed (now {100 * now:.2g} %)"
@@ -198,7 +198,7 @@ def _rate(t: Trial) -> Iterator[Remedy]:
     factor = next((f for f in map(float, FASTER) if t.stable(stretched=1 / f)), None)
     if factor is None:
         return
-    s = t.loop.s
+    s = t.loop.problem
     rows = 1 / t.problem.output_interval  # of which the new rate is a multiple, so that the rows still fit
     rate = math.ceil(INSIDE * factor / s.period / rows - 1e-9) * rows
     late, jitter = s.delay / s.period / rate, s.jitter / s.period / rate
@@ -209,7 +209,7 @@ def _rate(t: Trial) -> Iterator[Remedy]:
 
 def _delay(t: Trial) -> Iterator[Remedy]:
     """Yield less delay, if the loop was not built for its own."""
-    s = t.loop.s
+    s = t.loop.problem
     if isinstance(s.controller.inner, MatchedInnerLoop):
         return
     now = s.delay + s.jitter
@@ -222,14 +222,14 @@ def _delay(t: Trial) -> Iterator[Remedy]:
 
 
 def _jitter(t: Trial) -> Iterator[Remedy]:
-    s = t.loop.s
+    s = t.loop.problem
     if s.jitter and t.stable(late=s.delay):
         yield Remedy(f"no jitter (now {1e3 * s.jitter:.3g} ms)", {"control": {"jitter": 0.0}})
 
 
 def _as_the_law(t: Trial) -> Iterator[Remedy]:
     """Yield a fallback that is shaped as the law is, which holds if that law does."""
-    if t.found.part != "fallback" or not t.shapes or t.loop.s.allow_unstable:
+    if t.found.part != "fallback" or not t.shapes or t.loop.problem.allow_unstable:
         return
     own = t.problem.law.layout.unpack(t.problem.gains)
     shaping = {name: own[name].tolist() for name in ("shaped_stiffness", "shaped_inertia")}
@@ -239,7 +239,7 @@ def _as_the_law(t: Trial) -> Iterator[Remedy]:
 def _other_loop(t: Trial) -> Iterator[Remedy]:
     if not t.shapes:
         return
-    matched = isinstance(t.loop.s.controller.inner, MatchedInnerLoop)
+    matched = isinstance(t.loop.problem.controller.inner, MatchedInnerLoop)
     inner = "plain" if matched else "matched"
     control = {"inner_loop": inner} | ({} if matched else {"external_torque": "none"})
     told = "" if matched else ", with external_torque: none"
@@ -259,19 +259,17 @@ def _law(t: Trial, entry: Mapping[str, Any]) -> Mapping[str, Any]:
 
 
 def _is_new(problem: Problem, remedy: Remedy) -> bool:
-    return rewritten(problem.configuration, remedy.entry) != rewritten(problem.configuration, {})
+    return rewritten(problem.text, remedy.entry) != rewritten(problem.text, {})
 
 
 def _tried(problem: Problem, remedy: Remedy) -> bool:
     """Return whether the judge lets the whole changed scenario pass, on the robot of the problem."""
     try:
-        text = rewritten(problem.configuration, remedy.entry)
+        text = rewritten(problem.text, remedy.entry)
         changed = resolve(parse_scenario(text, "remedy"), problem.law.robot)
         if not np.array_equal(changed.plant, problem.plant):
             changed = altered(changed, plant=problem.law.robot.layout.unpack(problem.plant))
-        if (
-            changed.sampling is not None and changed.sampling.allow_unstable
-        ):  # then it is the fallback that has to hold
+        if require_sampled(changed).allow_unstable:  # then it is the fallback that has to hold
             alone = judged_fallback(changed)
             return alone is None or alone.stable
         return holds(changed, native=False)

@@ -49,8 +49,8 @@ class Trial:
         missed: float | None = None,
     ) -> bool:
         """Return whether all cases hold with changed gains, another clock, delay or share of missed periods."""
-        share = self.loop.s.missed if missed is None else missed
-        T = self.loop.s.period * stretched
+        share = self.loop.problem.missed if missed is None else missed
+        T = self.loop.problem.period * stretched
         for case in self.cases:
             gains = change(self.gains_of(case))
             delay = (case.delay if late is None else late) * stretched

@@ -1,0 +1,72 @@
+"""Friction of the motors."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping
+from dataclasses import dataclass, field
+from types import SimpleNamespace
+from typing import Any, ClassVar, Literal, final
+
+import casadi as cs
+from numpy.typing import ArrayLike
+
+from passiflex.elements.element import AbstractElement, Effect, Touch, nothing
+from passiflex.layout import Field, Layout
+
+
+@final
+@dataclass(frozen=True)
+class MotorFriction(AbstractElement):
+    """Coulomb and viscous friction of the motors, against θ̇ [N m, N m s/rad], each (n,) or one for all."""
+
+    meaning: ClassVar[str] = "lost in the motors' friction"
+    port: ClassVar[Literal["motors", "end effector"]] = "motors"
+    always: ClassVar[bool] = True
+    unknown: ClassVar[str] = "friction of the motors"
+    acts: bool = True
+    coulomb: Any = field(default=0.0, compare=False)
+    viscous: Any = field(default=0.0, compare=False)
+    width: float = field(default=0.01, compare=False)
+    """Speed over which Coulomb friction changes its sign [rad/s]."""
+
+    def parameters(self, n: int) -> Layout:
+        """Return the friction of each motor."""
+        return Layout(
+            (
+                Field("coulomb_friction", (n,), "N m", "at the motors, seen from the link"),
+                Field("viscous_friction", (n,), "N m s/rad", "at the motors, seen from the link"),
+                Field("friction_width", (), "rad/s", "speed over which Coulomb friction changes its sign"),
+            )
+        )
+
+    def numbers(self, n: int) -> Mapping[str, ArrayLike]:
+        """Return its values."""
+        return {
+            "coulomb_friction": _each(self.coulomb, n),
+            "viscous_friction": _each(self.viscous, n),
+            "friction_width": self.width,
+        }
+
+    @property
+    def name(self) -> str:
+        """Return what a run calls it."""
+        return "friction"
+
+    @property
+    def structure(self) -> Hashable:
+        """Return whether it acts: its numbers are parameters."""
+        return type(self), self.acts
+
+    def act(self, at: Touch, s: SimpleNamespace, m: SimpleNamespace) -> Effect:
+        """Return the friction torque."""
+        rubbing = friction(at.x.dtheta, m.coulomb_friction, m.viscous_friction, m.friction_width)
+        return nothing(rubbing.numel())._replace(motor=-rubbing, lost=cs.dot(rubbing, at.x.dtheta))
+
+
+def friction(dtheta: cs.SX, coulomb: cs.SX, viscous: cs.SX, width: cs.SX) -> cs.SX:
+    """Return the friction torque against θ̇ (n,) N m; it never gives power: each entry has the sign of θ̇."""
+    return coulomb * cs.tanh(dtheta / width) + viscous * dtheta
+
+
+def _each(value: Any, n: int) -> list[float]:
+    return [float(v) for v in value] if hasattr(value, "__len__") else [float(value)] * n
