@@ -10,7 +10,6 @@ import casadi as cs
 
 import passiflex as pf
 from passiflex.elements import AbstractElement, nothing
-from passiflex.layout import Layout
 
 
 @dataclass(frozen=True)
@@ -18,12 +17,6 @@ class Brush(AbstractElement):
     """A drag that grows with the square of the speed."""
 
     strength: float  # N s²/m²
-
-    def parameters(self, n):
-        return Layout(())
-
-    def inputs(self):
-        return Layout(())
 
     def act(self, at, s, m):
         drag = self.strength * cs.norm_2(cs.vertcat(at.velocity, 1e-6)) * at.velocity

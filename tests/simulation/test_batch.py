@@ -15,7 +15,8 @@ from passiflex.native import find_compiler
 from passiflex.problems.altered import altered
 from passiflex.problems.problem import Problem, SampledProblem
 from passiflex.simulation import Run, batch, resolve
-from passiflex.simulation.batch import Recording, digest_batch, lane_loop, simulate_batch
+from passiflex.simulation.batch import digest_batch, lane_loop, simulate_batch
+from passiflex.simulation.recording import Recording
 from passiflex.simulation.simulate_sampled import longest_step, simulate_unchecked
 from passiflex.studies.paper import shipped_scenario
 from worlds import PERIOD, merged, world

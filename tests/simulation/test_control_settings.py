@@ -275,7 +275,7 @@ def test_the_interval_that_is_left_out_fits_a_short_run_and_the_noise() -> None:
 def test_without_a_rate_nothing_sampled_is_allowed() -> None:
     assert mistakes(changed(CONTROL + "\n", "")) == [
         f"line 12, column 10, sensors: {ONLY}",
-        f"line 13, column 9, motors: {ONLY}",
+        f"line 13, column 24, motors.torque_limit: {ONLY}",
         "line 14, column 14, tank.kind: a tank of kind port needs `control`, a rate at which it runs",
         f"line 15, column 10, actions: {ONLY}",
         f"line 17, column 3, gains: {ONLY}",

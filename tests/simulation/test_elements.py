@@ -125,6 +125,6 @@ def test_a_plant_has_the_numbers_of_what_touches_it() -> None:
     extra = {f.name for f in touched.parameters} - {f.name for f in bare.parameters}
     assert extra == {"coulomb_friction", "viscous_friction", "friction_width"}
     assert {f.name for f in touched.environment} == {"F_e", *(f.name for f in Drag().inputs())}
-    assert [f.name for f in touched.energies][-2:] == ["friction", "drag"]
+    assert [f.name for f in touched.energies][-3:] == ["friction", "drag", "drag_given"]
     resting = Plant(robot, (MotorFriction(acts=False), Drag(acts=False)))
     assert [f.name for f in resting.energies][-1] == "friction"

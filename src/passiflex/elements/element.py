@@ -14,6 +14,7 @@ from typing import ClassVar, Literal, NamedTuple
 import casadi as cs
 from numpy.typing import ArrayLike
 
+from passiflex.control.motion import Pose
 from passiflex.layout import Layout
 from passiflex.robots.flexible import RobotState
 
@@ -25,7 +26,8 @@ class Touch(NamedTuple):
     ----------
     x: Its state.
     velocity, spin: Of the end effector (3,), in the axes of the last joint, which are those of `Effect`.
-    position, rotation: Of the end effector, in world axes; (3,) m and (3, 3).
+    position: Of the end effector, in world axes (3,) [m].
+    rotation: From those axes of velocity and force to world axes (3, 3).
     own: The element's own state, by name.
     """
 
@@ -60,6 +62,21 @@ class Effect(NamedTuple):
 def nothing(n: int) -> Effect:
     """Return the effect of no element, of which an element's own differs by what it does."""
     return Effect(cs.SX.zeros(n), cs.SX.zeros(3), cs.SX.zeros(3), cs.SX(0))
+
+
+class Books(NamedTuple):
+    """What a run has of an element: `NAME_energy` lost, `NAME_given_energy` at the end effector, `NAME_storage`."""
+
+    name: str
+    at_tip: bool
+    stores: bool
+
+    @property
+    def signals(self) -> tuple[str, ...]:
+        """Return the signals of its balance."""
+        given = (f"{self.name}_given_energy", f"{self.name}_given_power") if self.at_tip else ()
+        stored = (f"{self.name}_storage",) if self.stores else ()
+        return (f"{self.name}_energy", f"{self.name}_power", *given, *stored)
 
 
 class AbstractElement(abc.ABC):
@@ -101,13 +118,27 @@ class AbstractElement(abc.ABC):
         return Layout(())
 
     def state(self, n: int) -> Layout:
-        """Return what it remembers; zero at the start."""
+        """Return what it remembers."""
         return Layout(())
+
+    def start(self, at: Pose, n: int) -> Mapping[str, ArrayLike]:
+        """Return what it remembers at rest, with the end effector at a pose: zeros for most."""
+        return self.state(n).zeros()
 
     @property
     def structure(self) -> Hashable:
         """Return what its code depends on: elements that agree in it share compiled code."""
         return self
+
+    @property
+    def at_tip(self) -> bool:
+        """Return whether it touches the end effector."""
+        return self.port == "end effector"
+
+    @property
+    def books(self) -> Books:
+        """Return what a run has of it."""
+        return Books(self.name, self.at_tip, self.stores)
 
     @abc.abstractmethod
     def act(self, at: Touch, s: SimpleNamespace, m: SimpleNamespace) -> Effect:

@@ -12,6 +12,7 @@ import casadi as cs
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from passiflex.control.motion import Pose
 from passiflex.elements import AbstractElement, Drag, Effect, MotorFriction, Touch, nothing
 from passiflex.layout import Field, Layout, Signal
 from passiflex.robots.arm import TipWrench
@@ -75,7 +76,7 @@ class Plant:
         """Return what is summed up over time."""
         lost = tuple(Field(e.name, (), "J", e.meaning) for e in self.booked)
         given = tuple(
-            Field(f"{e.name}_given", (), "J", "given to the robot") for e in self.booked if e.stores
+            Field(f"{e.name}_given", (), "J", "given to the robot") for e in self.booked if e.at_tip
         )
         return Layout(PORTS + lost + given)
 
@@ -91,9 +92,11 @@ class Plant:
         )
         return sum((e.state(n) for e in self.elements), Layout(robot))
 
-    def at_rest(self, q: Array, theta: Array) -> Array:
-        """Return the flat state of a robot that stands still, with elements that have not been touched."""
-        return self.state.pack(self.state.zeros() | {"q": q, "theta": theta})
+    def at_rest(self, q: Array, theta: Array, at: Pose) -> Array:
+        """Return the flat state of a robot that stands still with its end effector at a pose, and of the elements."""
+        own = (e.start(at, self.robot.n).items() for e in self.elements)
+        touched = {name: np.asarray(value, dtype=float) for items in own for name, value in items}
+        return self.state.pack(self.state.zeros() | {"q": q, "theta": theta} | touched)
 
     def view(self, x: cs.SX) -> RobotState:
         """Return the robot's own state."""
@@ -126,7 +129,8 @@ class Plant:
     def _touch(self, x: cs.SX, m: SimpleNamespace) -> Touch:
         arm, robot = self.robot.arm, self.view(x)
         velocity, spin = arm.tip_velocity(robot.q, robot.dq, m)
-        return Touch(robot, velocity, spin, *arm.pose(robot.q, m), own=SimpleNamespace())
+        axes = cs.horzcat(*(arm.in_world_axes(robot.q, axis) for axis in cs.horzsplit(cs.SX.eye(3))))
+        return Touch(robot, velocity, spin, arm.pose(robot.q, m).position, axes, own=SimpleNamespace())
 
     def _effects(self, at: Touch, x: cs.SX, s: SimpleNamespace, m: SimpleNamespace) -> list[Effect]:
         effects = []

@@ -6,6 +6,7 @@ from passiflex.passivity.audit import audit_if_possible as audit_if_possible
 from passiflex.passivity.extremes import available_energy as available_energy
 from passiflex.passivity.ledger import Balance as Balance
 from passiflex.passivity.ledger import claimed_balance as claimed_balance
+from passiflex.passivity.ledger import environment_balance as environment_balance
 from passiflex.passivity.ledger import link_balance as link_balance
 from passiflex.passivity.ledger import overclaimed as overclaimed
 from passiflex.passivity.ledger import port_tank as port_tank

@@ -14,6 +14,7 @@ from passiflex.passivity.ledger import (
     Balance,
     Signals,
     claimed_balance,
+    environment_balance,
     link_balance,
     motor_side_storage,
     robot_balance,
@@ -44,7 +45,8 @@ class Audit:
     integration_error: Largest residual of the links' balance, which holds whatever the law [J].
     books_error: How wrong the law's own books are [J]: the largest residual of (28)–(29), round-off if its
         model is right; of a sampled law, the most that its tank claims beyond what is there.
-    ledger_residual: Largest residual of the real robot's balance (4), at the rows [J].
+    ledger_residual: Largest residual of the real robot's balance (4), and of what touches its end effector, at the
+        rows [J]: an element that gives what it did not have shows here.
     unbooked: What the law's books do not know in this run, in words.
     every_step: Whether it was judged at every step; otherwise at its rows, and nobody saw what was between.
     remedy: What to do about it.
@@ -79,7 +81,9 @@ def audit(run: Signals) -> Audit:
     """
     if not hasattr(run, "unbooked"):
         raise ArgumentError(run, "a run, as simulate returns", "Run.load for a file")
-    balances = robot_balance(run), link_balance(run), claimed_balance(run)
+    balances: tuple[Balance, ...] = robot_balance(run), link_balance(run), claimed_balance(run)
+    if any(e.at_tip for e in run.elements):
+        balances = (*balances, environment_balance(run))
     found = extremes(run)
     verdict, time, term, remedy = _judged(run, found, readable=_readable(run, balances[1]))
     return Audit(
@@ -90,7 +94,7 @@ def audit(run: Signals) -> Audit:
         margin_time=found.time,
         integration_error=found.integration_error,
         books_error=found.books_error,
-        ledger_residual=balances[0].worst,
+        ledger_residual=max(balance.worst for balance in (balances[0], *balances[3:])),
         unbooked=run.unbooked,
         every_step=found.every_step,
         remedy=remedy,

@@ -12,6 +12,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from passiflex.elements import Books
 from passiflex.loops.sampled_loop import AT_ONCE
 
 Array = NDArray[np.float64]
@@ -30,6 +31,8 @@ class Signals(Protocol):
     def has_tank(self) -> bool: ...  # noqa: D102
     @property
     def unbooked(self) -> str: ...  # noqa: D102
+    @property
+    def elements(self) -> tuple[Books, ...]: ...  # noqa: D102
     def __getitem__(self, name: str) -> Array: ...
 
 
@@ -93,6 +96,7 @@ class Balance:
 
 def robot_balance(run: Signals) -> Balance:
     """Return the balance of the real robot, (3)–(4): true whatever the law; its residual is the integrator's."""
+    own = [e for e in run.elements if not e.at_tip]
     return Balance.of(
         run,
         "robot",
@@ -101,9 +105,27 @@ def robot_balance(run: Signals) -> Balance:
             "motors": run["motor_kinetic_energy"],
             "joint springs": run["joint_spring_energy"],
             "gravity": run["potential_energy"],
+            **{e.name: run[f"{e.name}_storage"] for e in own if e.stores},
         },
         {"environment": "external", "motor torque": "motor"},
-        {"joint dampers": "joint_loss"} | ({"motor friction": "friction"} if run.sampled else {}),
+        {"joint dampers": "joint_loss"} | {f"motor {e.name}": e.name for e in own},
+    )
+
+
+def environment_balance(run: Signals) -> Balance:
+    """Return the balance of what touches the end effector: what it gives to the robot it had, or lost less.
+
+    Pushes of the scenario are no part of it: they give whatever they are told to.
+    """
+    there = [e.name for e in run.elements if e.at_tip]
+    stored = {e.name: run[f"{e.name}_storage"] for e in run.elements if e.at_tip and e.stores}
+    return Balance(
+        "environment",
+        stored or {"nothing stored": np.zeros_like(run["external_energy"])},
+        {f"{name}, from the robot": -run[f"{name}_given_energy"] for name in there},
+        {f"{name}, lost": run[f"{name}_energy"] for name in there},
+        {f"{name}, from the robot": -run[f"{name}_given_power"] for name in there},
+        {f"{name}, lost": run[f"{name}_power"] for name in there},
     )
 
 

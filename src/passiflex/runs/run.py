@@ -12,9 +12,11 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from passiflex.elements import Books, MotorFriction
 from passiflex.errors import FrozenError, RunFileError
 from passiflex.files import as_path, read_json, whole_file
 from passiflex.layout import Layout
+from passiflex.loops.plant import Plant
 from passiflex.loops.witness import Noted
 from passiflex.origin import package_version, source_commit
 from passiflex.problems.unbooked import UNKNOWN, unbooked
@@ -71,6 +73,14 @@ class Run:
     def unbooked(self) -> str:
         """Return what the law's books do not know in this run, in words."""
         return str(self.data.attrs.get("unbooked", UNKNOWN))
+
+    @property
+    def elements(self) -> tuple[Books, ...]:
+        """Return what touched the robot; a sampled run of before had friction alone in its books."""
+        found = read_json(self.data.attrs.get("elements", "[]"))
+        if "elements" not in self.data.attrs and self.sampled:
+            return (MotorFriction().books,)
+        return tuple(Books(*entry) for entry in found)
 
     @property
     def events(self) -> list[dict[str, Any]]:
@@ -207,6 +217,7 @@ def assemble(
         "sources": json.dumps(robot.sources, ensure_ascii=False),
         "seed": problem.seed,
         "unbooked": unbooked(problem),
+        "elements": json.dumps([e.books for e in Plant(robot, problem.elements).booked]),
         "has_tank": int(problem.law.has_tank),
         "control_period": getattr(problem, "period", 0.0),
         "version": package_version(),

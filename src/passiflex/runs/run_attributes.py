@@ -34,6 +34,17 @@ def _mapping(text: str) -> str:
     return _json(text, dict)
 
 
+def _elements(text: str) -> str:
+    """Return the text if it is a list of [name, whether at the end effector, whether it stores energy]."""
+    for entry in read_json(_json(text, list)):
+        kinds = [type(part) for part in entry] if isinstance(entry, list) else []
+        if kinds != [str, bool, bool]:
+            raise ValueError(
+                "expected a list of name, whether at the end effector, and whether it stores energy"
+            )
+    return text
+
+
 Name = Annotated[str, Field(max_length=LONGEST_NAME)]
 Text = Annotated[str, Field(max_length=LONGEST_TEXT)]
 Positive = Annotated[float, Field(ge=0, allow_inf_nan=False)]
@@ -48,6 +59,7 @@ KINDS: dict[str, Any] = {
     "sources": Annotated[Text, AfterValidator(_mapping)],
     "seed": Annotated[int, Field(ge=0)],
     "unbooked": Text,
+    "elements": Annotated[Text, AfterValidator(_elements)],
     "has_tank": Annotated[int, Field(ge=0, le=1)],
     "control_period": Positive,
     "version": Name,

@@ -153,6 +153,17 @@ class MotorSettings(Section):
         default=0.01, description="speed over which Coulomb friction changes its sign, rad/s"
     )
 
+    def require_unlimited(self) -> None:
+        """Raise Mistakes for limits, which only a sampled run has."""
+        said = {
+            "torque_limit": self.torque_limit != "none",
+            "torque_rate_limit": self.torque_rate_limit < ENDLESS,
+        }
+        if found := [
+            ((name,), "needs `control`: only a sampled run has it") for name, is_set in said.items() if is_set
+        ]:
+            raise Mistakes(*found)
+
 
 class Actions(Section):
     """What is not passive, and only acts as far as the tank's valve is open."""

@@ -59,7 +59,7 @@ def _own_tank(data: dict[str, Any]) -> TankSettings | None:
 
 QUICK_DUMPER = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
 """That of LibYAML where there is one: a campaign writes down each of its samples."""
-WITH_CONTROL = ("sensors", "motors", "actions", "gain_changes", "feedforward")
+WITH_CONTROL = ("sensors", "actions", "gain_changes", "feedforward")
 """Entries of a scenario that only a sampled run has."""
 
 
@@ -102,7 +102,7 @@ class Scenario(Section):
         description="noise on the measured joint torque, which the rigid law does not use; none if left out",
     )
     sensors: SensorSettings | None = Field(default=None, description="sensors, with control only")
-    motors: MotorSettings | None = Field(default=None, description="motors, with control only")
+    motors: MotorSettings | None = Field(default=None, description="motors; limits with control only")
     actions: Actions | None = Field(default=None, description="gated actions, with control only")
     gain_changes: tuple[GainChange, ...] = Field(
         default=(),
@@ -189,6 +189,13 @@ class Scenario(Section):
         if entry and "control" in info.data and info.data["control"] is None:
             raise ValueError("needs `control`: only a sampled run has it")
         return entry
+
+    @field_validator("motors")
+    @classmethod
+    def _limits_only_sampled(cls, motors: MotorSettings | None, info: ValidationInfo) -> MotorSettings | None:
+        if motors is not None and "control" in info.data and info.data["control"] is None:
+            motors.require_unlimited()
+        return motors
 
     @field_validator("gain_changes")
     @classmethod

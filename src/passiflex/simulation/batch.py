@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Callable, Hashable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 from typing import TypeVar
 
 import numpy as np
@@ -20,6 +19,7 @@ from passiflex.native import Change, LaneFunctions, LaneInputs, LaneLoop, find_c
 from passiflex.problems.problem import Problem, SampledProblem
 from passiflex.problems.unbooked import unbooked
 from passiflex.runs.run import Recorded, Run, assemble
+from passiflex.simulation.recording import Recording, books_kept
 from passiflex.simulation.schedule import Chance, Scheduled, schedule
 from passiflex.simulation.simulate_sampled import (
     left_finite,
@@ -37,33 +37,6 @@ CHUNK = 2048
 """Periods that are made ready at a time."""
 
 _lane_loops: dict[tuple[Hashable, int | None], LaneLoop] = {}
-
-
-@dataclass(frozen=True, eq=False)
-class Recording:
-    """The signals of one run that were asked for, as `Run` has them.
-
-    Attributes
-    ----------
-    signals: By name, arrays whose first axis is the row.
-    time: Of the rows [s].
-    failure: Why the run ended early; empty if it did not.
-    has_tank: Whether its law has a tank.
-    unbooked: What the law's books do not know in it, in words.
-    noted: What was noted at every step, whatever was asked for.
-    """
-
-    signals: dict[str, Array]
-    time: Array
-    failure: str
-    has_tank: bool
-    unbooked: str
-    noted: dict[str, Array]
-    sampled: bool = True
-
-    def __getitem__(self, name: str) -> Array:
-        """Return a signal as an array, time is the first axis; or what was noted."""
-        return self.signals[name] if name in self.signals else self.noted[name]
 
 
 def simulate_batch(
@@ -161,7 +134,8 @@ def _alone(problem: SampledProblem, keep: Sequence[str]) -> Recording:
             raise NameUnknownError("signal", name, known)
     noted = {f.name: run[f.name] for f in _compiled(problem).loop.witness.extremes}
     signals = {name: run[name] for name in keep}
-    return Recording(signals, run.time, run.failure, run.has_tank, run.unbooked, noted)
+    elements = books_kept(problem, keep)
+    return Recording(signals, run.time, run.failure, run.has_tank, run.unbooked, noted, elements)
 
 
 def _advance(
@@ -274,7 +248,9 @@ def _recording(
     }
     time = np.arange(count, dtype=np.float64) * (problem.period * every)
     failure = "" if ended == samples else left_finite(ended * problem.period)
-    return Recording(signals, time, failure, problem.law.has_tank, unbooked(problem), noted.values)
+    elements = books_kept(problem, signals)
+    has_tank, missed = problem.law.has_tank, unbooked(problem)
+    return Recording(signals, time, failure, has_tank, missed, noted.values, elements)
 
 
 def simulate_in_lane(problem: SampledProblem) -> Run:

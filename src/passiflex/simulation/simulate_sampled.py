@@ -51,14 +51,15 @@ def start(problem: SampledProblem, compiled: CompiledSampledLoop) -> LoopState:
     """Return the loop at rest at its start, with the reference where the end effector is."""
     at, gains = standing(problem), problem.law.layout.unpack(problem.gains)
     rest = at_rest(problem, at, problem.home, gains["stiffness"], problem.tank.initial, running=0.0)
-    x = compiled.loop.plant.at_rest(problem.q, problem.theta)
+    x = compiled.loop.plant.at_rest(at.q, at.theta, at.arm.pose)
     return compiled.held.start(x, compiled.loop.start(rest), problem.held)
 
 
 def longest_step(problem: SampledProblem, plant: NativeFunction) -> float:
     """Return the longest step that resolves the plant's fastest pole at the start, with the worst drag."""
     layout = problem.loop.plant.environment
-    x = problem.loop.plant.at_rest(problem.q, problem.theta)
+    at = standing(problem)
+    x = problem.loop.plant.at_rest(at.q, at.theta, at.arm.pose)
     worst = layout.zeros()
     for event in problem.events:
         worst |= {name: np.maximum(worst[name], value) for name, value in event.inputs.items()}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +14,7 @@ from passiflex.loops.closed_loop import ClosedLoop
 from passiflex.loops.compiled import CompiledLoop, compiled_loop
 from passiflex.native import Watched, fastest_pole
 from passiflex.native.stability import STABILITY_LIMIT
+from passiflex.problems.posture import posture
 from passiflex.problems.problem import Event, Problem, SampledProblem
 from passiflex.runs.run import Recorded, Run, assemble
 from passiflex.simulation.integrate import (
@@ -93,8 +93,9 @@ class _Simulation:
         self.planned: Motion = hold(problem.home)  # until the first event, which may be a jump
         self.motion = self.planned
         self.began = 0.0
-        own: dict[str, Any] = {"q": problem.q, "theta": problem.theta, "tank_energy": problem.tank.initial}
-        self.x = loop.state.pack(loop.state.zeros() | own)
+        hand = posture(problem.law.robot, problem.q, problem.parts.unpack("plant", problem.numbers)).pose
+        at_rest = loop.plant.at_rest(problem.q, problem.theta, hand)
+        self.x = np.concatenate([at_rest, [problem.tank.initial, 0.0]])  # and the clock
         self.energies = np.zeros(loop.energies.size)
         witness = loop.witness
         limits = witness.numbers(problem.law.robot, problem.tank.initial)

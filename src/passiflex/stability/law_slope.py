@@ -53,7 +53,7 @@ class LawSlope:
         self.numbers = self.parts.replaced(numbers, IDEAL)
         self.remembered = _acting(compiled.loop)
         self.n = problem.law.robot.n
-        self.x = compiled.loop.plant.at_rest(at.q, at.theta)
+        self.x = compiled.loop.plant.at_rest(at.q, at.theta, at.arm.pose)
         self._known: dict[tuple[float, float, Key], Array] = {}
         self._rest: tuple[tuple[float, Key], AtRest] | None = None
 

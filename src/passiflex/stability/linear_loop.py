@@ -211,7 +211,7 @@ class LinearLoop:
     def plants(self, others: Sequence[Standing]) -> Array:
         """Return [A B] of other robots, or of this one elsewhere (M, N, N + n): all by one call of compiled code."""
         plant = self.compiled.loop.plant
-        where = [np.concatenate([plant.at_rest(at.q, at.theta), at.held]) for at in others]
+        where = [np.concatenate([plant.at_rest(at.q, at.theta, at.arm.pose), at.held]) for at in others]
         points, steps = zip(*(differences(x) for x in where), strict=True)
         rows = np.vstack(points)
         numbers = np.repeat([self._smooth(at) for at in others], len(points[0]), axis=0)
