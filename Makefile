@@ -19,7 +19,7 @@ unexport UV_PROJECT_ENVIRONMENT UV_PYTHON UV_SYSTEM_PYTHON
 export UV_SYSTEM_CERTS ?= 1
 
 .DELETE_ON_ERROR:
-.PHONY: help reproduce test test-slow check docs bench browser extras lock wheel clean
+.PHONY: help reproduce test test-slow check docs front bench browser extras lock wheel clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/\1|\2/p' Makefile | awk -F'|' '{printf "make %-10s %s\n", $$1, $$2}'
@@ -44,6 +44,9 @@ check: $(VENV)/.dev-stamp $(WEB_PACKAGES) ## lint, formatting and types; types a
 
 docs: $(VENV)/.dev-stamp ## build the documentation into docs/_build/html; a warning is an error
 	$(BIN)/python -m sphinx -W -b html docs docs/_build/html $(ARGS)
+
+front: $(VENV)/.dev-stamp ## draw the README's picture, docs/front.svg, anew
+	$(BIN)/python docs/front_picture.py
 
 bench: $(VENV)/.dev-stamp ## run every script in benchmarks/
 	@for script in $$(grep -l __main__ benchmarks/*.py); do \
