@@ -4,6 +4,7 @@
 # ///
 """What does it cost to move the reference, and who pays?"""
 
+# %% the scenario
 import passiflex as pf
 
 scenario = {
@@ -23,9 +24,13 @@ scenario = {
     "reference": [{"at": "0.2 s", "kind": "circle", "plane": ["x", "z"], "radius": "5 cm", "period": "2 s"}],
     "duration": "4 s",
 }
+
+# %% the run
 run = pf.simulate(scenario)
 print(
     f"the reference was granted {run['granted_energy'][-1]:.3f} J and held back for {run['governed_time'][-1]:.2f} s"
 )
 print(f"the tank had 1 J, at least {run['lowest_level'][-1]:.3f} J, and has {run['tank_energy'][-1]:.3f} J")
+
+# %% the verdict
 print(f"the run was {pf.audit(run).verdict}")

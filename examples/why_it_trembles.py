@@ -4,6 +4,7 @@
 # ///
 """Why does my arm tremble, and what is the least that helps?"""
 
+# %% the scenario
 import passiflex as pf
 
 scenario = {
@@ -21,6 +22,8 @@ scenario = {
     "control": {"rate": "1 kHz", "delay": "1 ms"},
     "duration": "1 s",
 }
+
+# %% the answer
 answer = pf.check(scenario)
 print(answer.sentence)
 print(f"{answer.spectrum.frequency:.0f} Hz at joint {answer.spectrum.joint}")

@@ -24,7 +24,10 @@ from worlds import merged
 
 ROOT = Path(__file__).parents[1]
 EXAMPLES = ROOT / "docs" / "examples"
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+PAGES = [
+    ROOT / "README.md",
+    *sorted(path for folder in (".", "notebooks") for path in (ROOT / "docs" / folder).glob("*.md")),
+]
 FENCE = re.compile(r"^```(\S*)[^\n]*\n(.*?)^```", re.MULTILINE | re.DOTALL)
 MARK = re.compile(r"<!-- no-run(?:: (?P<reason>\w[^>]*?))? -->\n*\Z")
 SLOW = re.compile(r"^passiflex (reproduce|search|limits|recommend)\b|--scheduler", re.MULTILINE)
