@@ -26,7 +26,9 @@ ROOT = Path(__file__).parents[1]
 EXAMPLES = ROOT / "docs" / "examples"
 PAGES = [
     ROOT / "README.md",
-    *sorted(path for folder in (".", "notebooks") for path in (ROOT / "docs" / folder).glob("*.md")),
+    *sorted(
+        path for folder in (".", "notebooks", "reference") for path in (ROOT / "docs" / folder).glob("*.md")
+    ),
 ]
 FENCE = re.compile(r"^```(\S*)[^\n]*\n(.*?)^```", re.MULTILINE | re.DOTALL)
 MARK = re.compile(r"<!-- no-run(?:: (?P<reason>\w[^>]*?))? -->\n*\Z")
