@@ -190,6 +190,13 @@ def test_every_public_name_is_in_the_reference() -> None:
         assert [name for name in public if not re.search(rf"\b{name}\b", text)] == [], room
 
 
+def test_the_glossary_is_in_the_order_of_the_alphabet() -> None:
+    text = (ROOT / "docs" / "glossary.md").read_text(encoding="utf-8")
+    words = re.findall(r"^(\w.*)\n  \w", text.partition("```{glossary}")[2], re.MULTILINE)
+    assert len(words) == len(set(words)) > 40
+    assert words == sorted(words)
+
+
 PAGE = textwrap.dedent(
     """\
     A
