@@ -66,7 +66,7 @@ def limits(folder: Path) -> None:
     from passiflex.limits import limit_map
     from passiflex.plotting.files import save_figure
     from passiflex.plotting.limits import draw_limits
-    from passiflex.scenarios.law_settings import ShapedInertia
+    from passiflex.scenarios.gain_settings import ShapedInertia
     from passiflex.simulation import resolve
     from passiflex.studies import shipped_scenario
 

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 
 from loops import GRAVITY, SEEDS, robots
 from passiflex.control import AbstractGravity, MotorGravity, RobotGravity, StaticGravity
-from passiflex.problems.posture import posture
+from passiflex.control.posture import posture
 from passiflex.robots.flexible import FlexibleJointRobot
 from passiflex.simulation import Scenario, resolve
 from passiflex.simulation import simulate as simulate_scenario

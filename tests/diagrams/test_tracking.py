@@ -23,9 +23,9 @@ from diagrams.seen import (
     without,
 )
 from passiflex.campaigns.measures import _ideal
+from passiflex.control.gain_design import target_inertia
 from passiflex.diagrams import Panel, Viewed, ideal_motion, panels, roles_of, viewed
 from passiflex.diagrams.tracking import orientation_error
-from passiflex.problems.gains import target_inertia
 from passiflex.simulation import Run, parse_scenario, resolve
 
 

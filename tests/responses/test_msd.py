@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import scipy.linalg
 
+from passiflex.control.gain_design import target_inertia
 from passiflex.control.motion import Motion, Pose, circle, hold, minimum_jerk
-from passiflex.problems.gains import target_inertia
 from passiflex.problems.problem import Event
 from passiflex.responses.msd import IdealResponse, ideal_response
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import yaml
 
+from passiflex.control.posture import posture
 from passiflex.control.tank import smoothstep
-from passiflex.problems.posture import posture
 from passiflex.simulation import Run, Scenario, parse_scenario, resolve, simulate
 from passiflex.studies import shipped_scenario
 from worlds import books, merged, ran, same, world

@@ -9,9 +9,9 @@ import pytest
 import yaml
 
 from passiflex.control.motion import pose_at
+from passiflex.control.posture import posture
 from passiflex.errors import NameUnknownError, PassiflexError, SizeError, ValueRangeError
 from passiflex.problems.altered import MOST_PERIODS, altered, at_rate
-from passiflex.problems.posture import posture
 from passiflex.problems.problem import SampledProblem
 from passiflex.sampled.matched_loop import MatchedInnerLoop
 from passiflex.simulation import Problem, parse_scenario, resolve

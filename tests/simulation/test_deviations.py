@@ -8,9 +8,9 @@ import casadi as cs
 import numpy as np
 import pytest
 
+from passiflex.control.posture import posture
 from passiflex.errors import SizeError
 from passiflex.problems.altered import altered
-from passiflex.problems.posture import posture
 from passiflex.problems.problem import SampledProblem
 from passiflex.problems.resolution import SCALED
 from passiflex.robots.flexible import RobotState

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 import yaml
 
+from passiflex.control.posture import posture
 from passiflex.errors import UnstableLoopError
 from passiflex.passivity import audit
 from passiflex.problems.altered import rewritten
-from passiflex.problems.posture import posture
 from passiflex.simulation import Run, parse_scenario, resolve, simulate, simulate_problem, simulate_sampled
 from passiflex.stability.causes import advise
 from passiflex.stability.judgement import judge

@@ -7,8 +7,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from passiflex.control.posture import posture
 from passiflex.native import FixedStep
-from passiflex.problems.posture import posture
 from passiflex.robots.chain import SerialChain, rotation_of
 from passiflex.robots.flexible import FlexibleJointRobot, RobotState
 

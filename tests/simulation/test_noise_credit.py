@@ -9,7 +9,7 @@ import pytest
 
 from passiflex.passivity import audit, overclaimed
 from passiflex.sampled.measurement_bound import SIGMAS
-from passiflex.scenarios.law_settings import ShapedInertia
+from passiflex.scenarios.gain_settings import ShapedInertia
 from passiflex.scenarios.scenario import Noise
 from passiflex.simulation import resolve, simulate
 from passiflex.stability.linear_loop import DrivenLoop, LinearLoop

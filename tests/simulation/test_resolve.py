@@ -10,13 +10,14 @@ import pytest
 import yaml
 from scipy.spatial.transform import Rotation
 
+from passiflex.control.gain_design import target_inertia
 from passiflex.control.law import ImpedanceLaw
 from passiflex.control.motion import pose_at
+from passiflex.control.posture import posture
 from passiflex.control.rigid import RigidImpedanceLaw
 from passiflex.control.tank import NO_CAP
 from passiflex.errors import NameUnknownError, PassiflexError, ScenarioError, SizeError, ValueRangeError
-from passiflex.problems.gains import target_inertia
-from passiflex.problems.posture import natural_inertia, posture
+from passiflex.problems.natural_inertia import natural_inertia
 from passiflex.robots import FlexibleJointRobot
 from passiflex.simulation import ClosedLoop, Problem, Scenario, parse_scenario, resolve
 from passiflex.studies import shipped_scenario

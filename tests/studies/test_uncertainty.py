@@ -10,9 +10,9 @@ import pytest
 
 from passiflex.campaigns import columns, draws, require_possible, sample_scenario
 from passiflex.control.law import ImpedanceLaw
+from passiflex.control.posture import posture
 from passiflex.control.rigid import RigidImpedanceLaw
 from passiflex.limits.workspace import REGULAR
-from passiflex.problems.posture import posture
 from passiflex.problems.problem import SampledProblem
 from passiflex.simulation import resolve
 from passiflex.studies.reproduce import reproduce

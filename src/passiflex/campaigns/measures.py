@@ -8,9 +8,9 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from passiflex.control.gain_design import target_inertia
 from passiflex.passivity import audit
 from passiflex.passivity.ledger import Signals
-from passiflex.problems.gains import target_inertia
 from passiflex.problems.problem import Problem, SampledProblem
 from passiflex.responses.closed_form import ideal_displacement
 from passiflex.responses.metrics import rms

@@ -17,6 +17,8 @@ class AbstractGravity(abc.ABC):
     """A choice of gravity compensation; `in_model` says whether plant and law know gravity at all."""
 
     in_model: ClassVar[bool]
+    searches: ClassVar[bool] = False
+    """Whether it finds where the links rest by a fixed point, which a soft K_e lets contract too slowly."""
 
     @abc.abstractmethod
     def compensation(self, arm: SerialArm, phi: cs.SX, K_e: cs.SX, m: SimpleNamespace) -> Contribution:
@@ -56,6 +58,7 @@ class StaticGravity(AbstractGravity):
 
     steps: int = 8
     in_model: ClassVar[bool] = True
+    searches: ClassVar[bool] = True
 
     def rest_position(self, arm: SerialArm, phi: cs.SX, K_e: cs.SX, m: SimpleNamespace) -> cs.SX:
         """Return q̄(φ) (n,)."""

@@ -57,6 +57,8 @@ class AbstractTask(abc.ABC):
     """
 
     size: ClassVar[int]
+    turns: ClassVar[bool] = False
+    """Whether it holds an orientation."""
     free: tuple[int, ...]
 
     @property
@@ -134,6 +136,7 @@ class PoseTask(AbstractTask):
     """
 
     size: ClassVar[int] = 6
+    turns: ClassVar[bool] = True
     free: tuple[int, ...] = ()
 
     def potential(self, pose: EndEffectorPose, desired: EndEffectorPose, stiffness: cs.SX) -> cs.SX:

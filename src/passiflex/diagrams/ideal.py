@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from passiflex.control.gain_design import target_inertia
 from passiflex.control.motion import Pose
 from passiflex.diagrams.events import scenario_of
 from passiflex.diagrams.panel import Array
 from passiflex.errors import PassiflexError
-from passiflex.problems.gains import target_inertia
 from passiflex.problems.timeline import timeline
 from passiflex.responses.closed_form import ideal_displacement
 from passiflex.runs.run import Run

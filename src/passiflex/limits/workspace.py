@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from passiflex.control.posture import held_jacobian, posture
 from passiflex.control.task import AbstractTask
 from passiflex.errors import ValueRangeError
-from passiflex.problems.posture import held_jacobian, posture
 from passiflex.robots.flexible import FlexibleJointRobot
 
 Array = NDArray[np.float64]

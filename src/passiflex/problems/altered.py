@@ -12,8 +12,8 @@ import yaml
 from numpy.typing import ArrayLike, NDArray
 
 from passiflex.control.motion import Motion, Pose, pose_at, shifted
+from passiflex.control.posture import posture
 from passiflex.errors import NameUnknownError, ValueRangeError
-from passiflex.problems.posture import posture
 from passiflex.problems.problem import Problem, SampledProblem, require_sampled
 from passiflex.scenarios.control_settings import MOST_PERIODS
 from passiflex.scenarios.scenario import Scenario

@@ -8,19 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from passiflex.control.gravity import AbstractGravity, MotorGravity, RobotGravity, StaticGravity
-from passiflex.control.law import AbstractLaw, ImpedanceLaw
-from passiflex.control.rigid import RigidImpedanceLaw
-from passiflex.control.task import PoseTask, PositionTask
+from passiflex.control.law import AbstractLaw
+from passiflex.control.posture import SINGULAR, held_jacobian, posture
 from passiflex.errors import ArgumentError, SizeError, ValueRangeError
 from passiflex.loops.closed_loop import ClosedLoop
-from passiflex.problems.gains import law_gains, tank_gains, tank_start
-from passiflex.problems.posture import SINGULAR, held_jacobian, posture
 from passiflex.problems.problem import Noise, Problem, SampledProblem
 from passiflex.problems.sampling import Known, elements_of, sampled_parts
+from passiflex.problems.tank_numbers import tank_gains, tank_start
 from passiflex.problems.timeline import timeline
 from passiflex.robots.flexible import FlexibleJointRobot
-from passiflex.scenarios.law_settings import RigidSettings
 from passiflex.scenarios.model_errors import AbstractRelative
 from passiflex.scenarios.scenario import Scenario
 from passiflex.scenarios.scenario_file import parse_scenario
@@ -28,13 +24,6 @@ from passiflex.scenarios.scenario_file import parse_scenario
 Array = NDArray[np.float64]
 
 STANDARD_GRAVITY = (0.0, 0.0, -9.81)
-TASKS: dict[str, type[PoseTask] | type[PositionTask]] = {"pose": PoseTask, "position": PositionTask}
-GRAVITIES: dict[str, AbstractGravity] = {
-    "robot": RobotGravity(),
-    "motor": MotorGravity(),
-    "static": StaticGravity(),
-    "model": StaticGravity(),  # the rigid law cancels by its model; its plant has gravity
-}
 SCALED = {
     "joint_stiffness": ("joint_stiffness",),
     "joint_damping": ("joint_damping",),
@@ -65,7 +54,7 @@ def resolve(scenario: Scenario, robot: FlexibleJointRobot | None = None) -> Prob
         robot = FlexibleJointRobot.load(scenario.robot)
     else:  # what is stored beside the result must not pass for the scenario's own robot
         scenario = scenario.model_copy(update={"robot": f"{robot.name}, changed in memory"})
-    law = _law(scenario, robot)
+    law = scenario.law.build(robot)
     q = _start(scenario, robot)
     described = robot.nominal(STANDARD_GRAVITY if law.gravity.in_model else (0.0, 0.0, 0.0))
     arm = robot.arm.chain.with_tool(scenario.tool.position, scenario.tool.rotation_vector)
@@ -75,8 +64,8 @@ def resolve(scenario: Scenario, robot: FlexibleJointRobot | None = None) -> Prob
     at_start = posture(robot, q, plant)
     _refuse_too_few(law)
     _refuse_singular(scenario, held_jacobian(law.task, at_start))
-    gains = law_gains(scenario, law, model, posture(robot, q, model))
-    if isinstance(law.gravity, StaticGravity) and "shaped_stiffness" in gains:
+    gains = scenario.law.gains(law, model, posture(robot, q, model))
+    if law.gravity.searches and law.shapes:
         _refuse_soft(robot, q, model, gains["shaped_stiffness"])
     theta = q + at_start.gravity_torque / plant["joint_stiffness"]
     shaped = q + model["joint_stiffness"] / gains.get("shaped_stiffness", model["joint_stiffness"]) * (
@@ -123,12 +112,6 @@ def _checked(scenario: Scenario) -> Scenario:
         return parse_scenario(scenario.to_yaml(), source=f"scenario {scenario.name!r}")
 
 
-def _law(scenario: Scenario, robot: FlexibleJointRobot) -> AbstractLaw:
-    kind = RigidImpedanceLaw if isinstance(scenario.law, RigidSettings) else ImpedanceLaw
-    task = TASKS[scenario.law.task](free=scenario.law.stiffness.free)
-    return kind(robot, task, GRAVITIES[scenario.law.gravity])
-
-
 def _start(scenario: Scenario, robot: FlexibleJointRobot) -> Array:
     q = np.array(scenario.posture, dtype=float)
     if q.shape != (robot.n,):
@@ -153,7 +136,7 @@ def _start(scenario: Scenario, robot: FlexibleJointRobot) -> Array:
 def _refuse_too_few(law: AbstractLaw) -> None:
     """Raise ValueRangeError for a pose that has more directions to hold than the robot has joints."""
     held = len(law.task.held)
-    if isinstance(law.task, PoseTask) and law.robot.n < held:
+    if law.task.turns and law.robot.n < held:
         raise ValueRangeError(
             f"task 'pose' holds {held} directions, more than robot {law.robot.name!r} can move in",
             got=f"{law.robot.n} joints",
@@ -166,7 +149,7 @@ def _refuse_singular(scenario: Scenario, jacobian: Array) -> None:
     """Raise ValueRangeError where Λ of (31) does not exist and the law needs it."""
     values = np.linalg.svd(jacobian, compute_uv=False)
     enough = values.size == len(jacobian)
-    rigid, regularisation = isinstance(scenario.law, RigidSettings), scenario.law.regularisation
+    rigid, regularisation = not scenario.law.shapes, scenario.law.regularisation
     if values[-1] >= SINGULAR * values[0] and (enough or (regularisation > 0 and not rigid)):
         return
     if regularisation >= REGULAR and not rigid:

@@ -3,57 +3,33 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from passiflex.control.law import AbstractLaw
+from passiflex.control.posture import Posture
 from passiflex.control.tank import NO_CAP
 from passiflex.elements import MotorFriction
 from passiflex.errors import SizeError
 from passiflex.loops.plant import Elements
 from passiflex.loops.sampled_loop import SampledLoop
-from passiflex.problems.gains import sized
-from passiflex.problems.posture import Posture
 from passiflex.problems.problem import GainChange, Lasting
 from passiflex.robots.flexible import FlexibleJointRobot
 from passiflex.sampled.controller import SampledController
-from passiflex.sampled.external import (
-    AbstractExternalTorque,
-    MeasuredWrench,
-    MomentumObserver,
-    NoTorque,
-    TrueTorque,
-)
-from passiflex.sampled.inner_loop import AbstractInnerLoop, PlainInnerLoop
-from passiflex.sampled.matched_loop import MatchedInnerLoop
 from passiflex.sampled.measurement_bound import BEND
 from passiflex.sampled.motors import UNLIMITED_TORQUE
 from passiflex.sampled.sensors import UNFILTERED
-from passiflex.sampled.tanks import TANKS
 from passiflex.scenarios.control_settings import Actions, Control, MotorSettings, SensorSettings
-from passiflex.scenarios.law_settings import ImpedanceSettings
 from passiflex.scenarios.noise_settings import Noise
 from passiflex.scenarios.scenario import Scenario
 from passiflex.scenarios.tank_settings import TankSettings
 
 Array = NDArray[np.float64]
 
-EXTERNAL: dict[str, AbstractExternalTorque] = {
-    "true": TrueTorque(),
-    "measured": MeasuredWrench(),
-    "observer": MomentumObserver(),
-    "none": NoTorque(),
-}
-
 POSTURE_RATIO = 0.7
 """Damping ratio of the spring to a posture, joint by joint, unless its damping is given."""
-INNER: dict[str, Callable[[int], AbstractInnerLoop]] = {
-    "plain": lambda late: PlainInnerLoop(),
-    "matched": MatchedInnerLoop,
-}
 VELOCITY_GAIN, ACCELERATION_GAIN = 0.3, 0.05
 """Of the matched inner loop's estimates: of those that were tried at 1 kHz, the best compromise between the
 torque's noise and the lag in q̇, which acts as further inertia; from 0.2 on the second gain destabilises."""
@@ -89,9 +65,9 @@ def sampled_parts(
     tank, robot, model = scenario.tank, law.robot, known.model
     controller = SampledController(
         law,
-        TANKS[tank.kind or "port"]() if tank and law.has_tank else None,
-        EXTERNAL[control.external_torque],
-        INNER[control.inner_loop](round(control.delay * control.rate)),
+        tank.build() if tank and law.has_tank else None,
+        control.build_external(),
+        control.build_inner(),
         actions=scenario.actions is not None or bool(scenario.feedforward),
     )
     motors, sensors = scenario.motors or MotorSettings(), scenario.sensors or SensorSettings()
@@ -173,11 +149,11 @@ def _fallback(
     model: dict[str, Array],
     gains: dict[str, Array],
 ) -> dict[str, Array]:
-    if not isinstance(scenario.law, ImpedanceSettings):
+    if not scenario.law.shapes:
         return gains
     wanted = control.fallback
     changed = {
-        name: sized(f"control.fallback.{name}", getattr(wanted, name), model[own], robot)
+        name: getattr(wanted, name).resolve(model[own], f"control.fallback.{name}", robot.name)
         for name, own in (("shaped_stiffness", "joint_stiffness"), ("shaped_inertia", "motor_inertia"))
     }
     for name, matrix in (("stiffness", wanted.stiffness), ("damping", wanted.damping)):

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from passiflex.problems.problem import Problem, SampledProblem
-from passiflex.sampled.external import NoTorque
 
 UNKNOWN = "model error and noise"
 """Of a run that does not say what was in it."""
@@ -24,7 +23,7 @@ def unbooked(problem: Problem) -> str:
     s, rigid = problem if isinstance(problem, SampledProblem) else None, not problem.law.shapes
     causes = []
     if rigid:
-        blind = s is not None and isinstance(s.controller.external, NoTorque)
+        blind = s is not None and s.controller.external.blind
         causes.append(SHAPED + " without force sensing" * blind)
     elif s is not None:
         causes.append("sampling")

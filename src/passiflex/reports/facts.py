@@ -9,14 +9,14 @@ import numpy as np
 import yaml
 
 from passiflex.sampled.tanks import TANKS
-from passiflex.scenarios.law_settings import (
+from passiflex.scenarios.gain_settings import (
     Damping,
-    ImpedanceSettings,
     ShapedInertia,
     ShapedStiffness,
     Stiffness,
     TargetInertia,
 )
+from passiflex.scenarios.law_settings import ImpedanceSettings
 from passiflex.simulation import Run, Scenario, passed_limits
 from passiflex.texts.yaml_tree import RefusedText, Tree
 
@@ -83,9 +83,7 @@ def _robot(run: Run) -> str:
 
 def _law(scenario: Scenario) -> Facts:
     law = scenario.law
-    proposed = isinstance(law, ImpedanceSettings)
-    name = "impedance law for flexible joints" if proposed else "baseline for rigid joints"
-    found = [("law", f"{name}, task {law.task}"), ("gravity", GRAVITY[law.gravity])]
+    found = [("law", f"{law.title}, task {law.task}"), ("gravity", GRAVITY[law.gravity])]
     found.append(("stiffness K_x", _gains(law.stiffness, "N/m", "N m/rad")))
     found.append(("damping D_x", _gains(law.damping, "N s/m", "N m s/rad")))
     if isinstance(law, ImpedanceSettings):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import abc
 from dataclasses import dataclass
 from types import SimpleNamespace
-from typing import NamedTuple, final
+from typing import ClassVar, NamedTuple, final
 
 import casadi as cs
 
@@ -37,6 +37,9 @@ class Known(NamedTuple):
 
 class AbstractExternalTorque(abc.ABC):
     """A choice of τ_e."""
+
+    blind: ClassVar[bool] = False
+    """Whether the law takes whatever pushes the robot for error."""
 
     @abc.abstractmethod
     def state(self, n: int) -> Layout:
@@ -83,6 +86,8 @@ class MeasuredWrench(AbstractExternalTorque):
 @dataclass(frozen=True)
 class NoTorque(AbstractExternalTorque):
     """τ_e = 0: the law takes whatever pushes the robot for inertia and error."""
+
+    blind: ClassVar[bool] = True
 
     def state(self, n: int) -> Layout:
         """Return nothing."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import abc
 from dataclasses import dataclass
 from types import SimpleNamespace
-from typing import NamedTuple, final
+from typing import ClassVar, NamedTuple, final
 
 import casadi as cs
 
@@ -38,6 +38,11 @@ class AbstractInnerLoop(abc.ABC):
     @abc.abstractmethod
     def state(self, n: int) -> Layout:
         """Return what is remembered from one period to the next."""
+
+    kind: ClassVar[str] = "plain"
+    """Its name in a scenario."""
+    predicts: ClassVar[bool] = False
+    """Whether it is built for a delay."""
 
     def takes(self, law: AbstractLaw) -> bool:
         """Return whether it works with a law."""

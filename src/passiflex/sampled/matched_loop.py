@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from types import SimpleNamespace
-from typing import NamedTuple, final
+from typing import ClassVar, NamedTuple, final
 
 import casadi as cs
 import numpy as np
@@ -64,6 +64,8 @@ class MatchedInnerLoop(AbstractInnerLoop):
     """
 
     late: int = 1
+    kind: ClassVar[str] = "matched"
+    predicts: ClassVar[bool] = True
 
     def takes(self, law: AbstractLaw) -> bool:
         """Return whether it is the paper's law, which is taken apart."""

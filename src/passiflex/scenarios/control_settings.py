@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Annotated, Any, Literal, Self
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 from pydantic import AliasChoices, BeforeValidator, Field, model_validator
 
-from passiflex.scenarios.law_settings import (
+from passiflex.scenarios.gain_settings import (
     Damping,
     ShapedInertia,
     ShapedStiffness,
@@ -17,6 +17,10 @@ from passiflex.scenarios.law_settings import (
 from passiflex.scenarios.spans import Instant, Seconds, TimeSpan
 from passiflex.texts.quantity import Quantity, shown
 from passiflex.texts.section import Mistakes, Section
+
+if TYPE_CHECKING:  # who reads a scenario needs no CasADi
+    from passiflex.sampled.external import AbstractExternalTorque
+    from passiflex.sampled.inner_loop import AbstractInnerLoop
 
 Vector = tuple[float, ...]
 Found = list[tuple[tuple[str | int, ...], str]]
@@ -84,6 +88,27 @@ class Control(Section):
         validation_alias=AliasChoices("allow_unstable", "insist"),
         description="run the law even at a rate and delay at which it is unstable",
     )
+
+    def build_external(self) -> AbstractExternalTorque:
+        """Return where the law's τ_e comes from."""
+        from passiflex.sampled import external as e
+
+        kinds: dict[str, Callable[[], AbstractExternalTorque]] = {
+            "true": e.TrueTorque,
+            "measured": e.MeasuredWrench,
+            "observer": e.MomentumObserver,
+            "none": e.NoTorque,
+        }
+        return kinds[self.external_torque]()
+
+    def build_inner(self) -> AbstractInnerLoop:
+        """Return the inner loop, for this delay."""
+        from passiflex.sampled.inner_loop import PlainInnerLoop
+        from passiflex.sampled.matched_loop import MatchedInnerLoop
+
+        return {"plain": PlainInnerLoop, "matched": MatchedInnerLoop}[self.inner_loop]().expecting(
+            round(self.delay * self.rate)
+        )
 
     @model_validator(mode="after")
     def _few_on_their_way(self) -> Self:

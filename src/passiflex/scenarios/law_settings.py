@@ -1,220 +1,46 @@
-"""The settings of the two laws in a scenario: task, gains, shaping. All numbers in SI units."""
+"""The settings of the two laws in a scenario, which build them. All numbers in SI units."""
 
 from __future__ import annotations
 
-from typing import Annotated, Any, ClassVar, Literal, Self
+import abc
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
-from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
+from numpy.typing import NDArray
+from pydantic import Field, ValidationInfo, field_validator, model_validator
 
-from passiflex.errors import ValueRangeError
+from passiflex.scenarios.gain_settings import (
+    AbstractGains,
+    Damping,
+    ShapedInertia,
+    ShapedStiffness,
+    Stiffness,
+    TargetInertia,
+    axis_names,
+    free_mistakes,
+)
 from passiflex.texts.quantity import Quantity
 from passiflex.texts.section import Mistakes, Section
 
-Vector = tuple[float, ...]
-Matrix = tuple[Vector, ...]
-Positive = Annotated[float, Quantity("1", above=0)]
+if TYPE_CHECKING:
+    from passiflex.control.law import AbstractLaw
+    from passiflex.control.posture import Posture
+    from passiflex.control.task import AbstractTask
+    from passiflex.robots.flexible import FlexibleJointRobot
+
+Numbers = dict[str, NDArray[np.float64]]
 
 
-def _definite(matrix: Matrix) -> Matrix:
-    """Return a matrix that is symmetric and positive definite."""
-    from passiflex.control.definite import require_positive_definite
+class AbstractLawSettings(Section, abc.ABC):
+    """What all laws have.
 
-    try:
-        require_positive_definite("the matrix", np.array(matrix))
-    except ValueRangeError as error:
-        raise ValueError(str(error)) from None
-    return matrix
+    Whoever only reads a scenario needs no CasADi: it is imported where a law is built.
+    """
 
-
-def _free(matrix: Matrix) -> tuple[int, ...]:
-    """Return the axes without any gain."""
-    return tuple(i for i, row in enumerate(matrix) if not any(row))
-
-
-def _held(matrix: Matrix) -> Matrix:
-    """Return a matrix that is symmetric, and positive definite but for axes that are free."""
-    held = np.delete(np.array(matrix), _free(matrix), axis=0)
-    if len(held):
-        _definite(tuple(map(tuple, np.delete(held, _free(matrix), axis=1).tolist())))
-    if np.any(np.array(matrix)[:, list(_free(matrix))]):
-        raise ValueError("the matrix is not symmetric: a free axis has zeros in its row and column")
-    return matrix
-
-
-def _block(value: float | Vector | Matrix) -> Matrix:
-    """Return the 3×3 block of one number, 3 numbers or 3×3."""
-    if np.ndim(value) == 2:
-        return value  # type: ignore[return-value]
-    return tuple(map(tuple, np.diag(np.broadcast_to(value, 3)).tolist()))
-
-
-def _three(unit: str, **bound: float) -> Quantity:
-    return Quantity(unit, ((), (3,), (3, 3)), **bound)  # type: ignore[arg-type]
-
-
-def _said(axes: tuple[int, ...]) -> str:
-    """Return the names of axes: translation x, rotation z."""
-    return ", ".join(f"{('translation', 'rotation')[i // 3]} {'xyz'[i % 3]}" for i in axes) or "none"
-
-
-_BLOCK = AfterValidator(_block), AfterValidator(_held)
-_DEFINITE_BLOCK = AfterValidator(_block), AfterValidator(_definite)
-_FULL = Annotated[Matrix, Quantity("", ((3, 3), (6, 6)))]
-
-
-class _Shaped(Section):
-    """A joint quantity that the inner loop makes: a multiple of the law's own, or numbers."""
-
-    ways: ClassVar = (("ratio",), ("value",))
-    ratio: Annotated[float | Vector, Quantity("1", ((), (None,)), above=0)] | None = Field(
-        default=None, description="multiple of the law's own value, one number for all joints or one each"
-    )
-    value: float | Vector | None = Field(default=None, description="one number for all joints, or one each")
-
-    @model_validator(mode="before")
-    @classmethod
-    def _bare(cls, written: Any) -> Any:
-        quantity = isinstance(written, dict) and written and set(written) <= {"value", "unit"}
-        return written if isinstance(written, dict | cls) and not quantity else {"value": written}
-
-    @model_validator(mode="after")
-    def _one_way(self) -> Self:
-        if (self.ratio is None) == (self.value is None):
-            raise ValueError("needs either a ratio or a quantity")
-        return self
-
-    def resolve(self, own: ArrayLike) -> NDArray[np.float64]:
-        """Return the values (n,) for the law's `own` ones (n,)."""
-        own = np.asarray(own, dtype=float)
-        if self.value is None:
-            return own * np.broadcast_to(np.asarray(self.ratio), own.shape)
-        return np.array(np.broadcast_to(self.value, own.shape))
-
-
-class ShapedStiffness(_Shaped):
-    """K_e."""
-
-    value: Annotated[float | Vector, Quantity("N m/rad", ((), (None,)), above=0)] | None = Field(
-        default=None, description="one number for all joints, or one each, N m/rad"
-    )
-
-
-class ShapedInertia(_Shaped):
-    """B_e."""
-
-    value: Annotated[float | Vector, Quantity("kg m^2", ((), (None,)), above=0)] | None = Field(
-        default=None, description="one number for all joints, or one each, kg m^2"
-    )
-
-
-class _Gains(Section):
-    """A symmetric positive definite matrix of the task, by its blocks or as a whole; zero in axes that are free."""
-
-    alternative: ClassVar[str | None] = None
-    ways: ClassVar = (("translation", "rotation"), ("matrix",), ("ratio", "damping_ratio"))
-    translation: Matrix | None = Field(default=None, description="translational block")
-    rotation: Matrix | None = Field(default=None, description="rotational block; with task pose only")
-    matrix: Annotated[_FULL, AfterValidator(_held)] | None = Field(
-        default=None, description="the whole matrix in SI units: 6×6, or 3×3 for task position"
-    )
-
-    @model_validator(mode="after")
-    def _one_way(self) -> Self:
-        ways = [w for w in ("translation", "matrix", self.alternative) if w]
-        given = [w for w in ways if getattr(self, w) is not None]
-        if len(given) != 1:
-            raise ValueError(
-                f"needs exactly one of {', '.join(ways)}; got {' and '.join(given) or 'none of them'}"
-            )
-        if self.rotation is not None and given != ["translation"]:
-            raise Mistakes((("rotation",), "goes with translation only; remove it"))
-        if given != [self.alternative] and len(self.free) == len(self.full()):
-            raise ValueError("is zero in all directions; needs more than 0 in those that are not free")
-        return self
-
-    @property
-    def free(self) -> tuple[int, ...]:
-        """Return the axes of the task that are zero; not for gains given by a ratio."""
-        return _free(tuple(map(tuple, self.full().tolist())))
-
-    def require(self, task: str) -> None:
-        """Raise Mistakes unless the size is that of the task."""
-        size = 3 if task == "position" else 6
-        if self.matrix is not None and len(self.matrix) != size:
-            got = len(self.matrix)
-            raise Mistakes(
-                (("matrix",), f"a {task} task needs {size}×{size} numbers in SI units; got {got}×{got}")
-            )
-        if task == "position" and self.rotation is not None:
-            raise Mistakes((("rotation",), "a position task has no rotation; remove it, or take task: pose"))
-        if task == "pose" and self.translation is not None and self.rotation is None:
-            raise Mistakes((("rotation",), "missing; a pose task needs it, a position task does not"))
-
-    def full(self) -> NDArray[np.float64]:
-        """Return the matrix (6, 6), or (3, 3) for a position task; not for gains given by a ratio."""
-        if self.matrix is not None:
-            return np.array(self.matrix)
-        if self.translation is None:
-            raise ValueRangeError("gains given by a ratio have no matrix", needs="the inertia of a posture")
-        if self.rotation is None:
-            return np.array(self.translation)
-        zero = np.zeros((3, 3))
-        return np.block([[np.array(self.translation), zero], [zero, np.array(self.rotation)]])
-
-
-class Stiffness(_Gains):
-    """K_x."""
-
-    translation: Annotated[Matrix, _three("N/m", least=0), *_BLOCK] | None = Field(
-        default=None, description="one number, 3 numbers or 3×3, N/m, world axes; 0 for a free axis"
-    )
-    rotation: Annotated[Matrix, _three("N m/rad", least=0), *_BLOCK] | None = Field(
-        default=None,
-        description="one number, 3 numbers or 3×3, N m/rad, axes of the reference; 0 for a free axis",
-    )
-
-
-class Damping(_Gains):
-    """D_x."""
-
-    alternative: ClassVar[str | None] = "ratio"
-    translation: Annotated[Matrix, _three("N s/m", least=0), *_BLOCK] | None = Field(
-        default=None, description="one number, 3 numbers or 3×3, N s/m, world axes; 0 for a free axis"
-    )
-    rotation: Annotated[Matrix, _three("N m s/rad", least=0), *_BLOCK] | None = Field(
-        default=None,
-        description="one number, 3 numbers or 3×3, N m s/rad; world axes, with a free rotation those of the "
-        "reference; 0 for a free axis",
-    )
-    ratio: Positive | None = Field(
-        default=None,
-        description="damping ratio of every mode at the start posture, with the inertia of links and motors as "
-        "the law shapes them",
-    )
-
-
-class TargetInertia(_Gains):
-    """M_x."""
-
-    alternative: ClassVar[str | None] = "damping_ratio"
-    matrix: Annotated[_FULL, AfterValidator(_definite)] | None = Field(
-        default=None, description="the whole matrix in SI units: 6×6, or 3×3 for task position"
-    )
-    translation: Annotated[Matrix, _three("kg", above=0), *_DEFINITE_BLOCK] | None = Field(
-        default=None, description="one number, 3 numbers or 3×3, kg"
-    )
-    rotation: Annotated[Matrix, _three("kg m^2", above=0), *_DEFINITE_BLOCK] | None = Field(
-        default=None, description="one number, 3 numbers or 3×3, kg m^2; with task pose only"
-    )
-    damping_ratio: Positive | None = Field(
-        default=None, description="the inertia that gives every mode this damping ratio"
-    )
-
-
-class _LawSettings(Section):
-    """What both laws have."""
+    title: ClassVar[str]
+    """The law in words."""
+    shapes: ClassVar[bool]
+    """Whether it gives the joints another stiffness and the motors another inertia, and has a tank."""
 
     task: Literal["pose", "position"] = Field(description="all six directions, or position only")
     stiffness: Stiffness = Field(description="stiffness K_x of the Cartesian spring")
@@ -228,7 +54,7 @@ class _LawSettings(Section):
 
     @field_validator("stiffness", "damping", "target_inertia", check_fields=False)
     @classmethod
-    def _sized(cls, gains: _Gains, info: ValidationInfo) -> _Gains:
+    def _sized(cls, gains: AbstractGains, info: ValidationInfo) -> AbstractGains:
         if "task" in info.data:
             gains.require(info.data["task"])
         return gains
@@ -240,9 +66,38 @@ class _LawSettings(Section):
             raise Mistakes((("damping",), found))
         return self
 
+    @abc.abstractmethod
+    def build(self, robot: FlexibleJointRobot) -> AbstractLaw:
+        """Return the law."""
 
-class ImpedanceSettings(_LawSettings):
+    @abc.abstractmethod
+    def gains(self, law: AbstractLaw, model: Numbers, start: Posture) -> Numbers:
+        """Return the numbers of `law.layout`, with the law's model and the start posture as that model sees it.
+
+        Raises
+        ------
+        SizeError
+            For numbers that do not fit the robot's joints.
+        """
+
+    def _common(self) -> Numbers:
+        return {
+            "stiffness": self.stiffness.full(),
+            "null_space_damping": np.asarray(self.null_space_damping),
+            "regularisation": np.asarray(self.regularisation),
+        }
+
+    def _task(self) -> AbstractTask:
+        from passiflex.control.task import PoseTask, PositionTask
+
+        return {"pose": PoseTask, "position": PositionTask}[self.task](free=self.stiffness.free)
+
+
+class ImpedanceSettings(AbstractLawSettings):
     """The paper's law."""
+
+    title: ClassVar[str] = "impedance law for flexible joints"
+    shapes: ClassVar[bool] = True
 
     type: Literal["impedance"] = Field(description="the law: impedance (the paper's) or rigid (the baseline)")
     gravity: Literal["robot", "motor", "static"] = Field(
@@ -254,9 +109,37 @@ class ImpedanceSettings(_LawSettings):
     )
     shaped_inertia: ShapedInertia = Field(description="B_e: {ratio: multiple of B}, or a quantity in kg m^2")
 
+    def build(self, robot: FlexibleJointRobot) -> AbstractLaw:
+        """Return the law."""
+        from passiflex.control.gravity import MotorGravity, RobotGravity, StaticGravity
+        from passiflex.control.law import ImpedanceLaw
 
-class RigidSettings(_LawSettings):
+        carries = {"robot": RobotGravity, "motor": MotorGravity, "static": StaticGravity}[self.gravity]
+        return ImpedanceLaw(robot, self._task(), carries())
+
+    def gains(self, law: AbstractLaw, model: Numbers, start: Posture) -> Numbers:
+        """Return the numbers of the law; a damping ratio is designed for the start."""
+        from passiflex.control.gain_design import designed_damping
+
+        own, robot = self._common(), law.robot.name
+        own["shaped_stiffness"] = self.shaped_stiffness.resolve(
+            model["joint_stiffness"], "law.shaped_stiffness", robot
+        )
+        own["shaped_inertia"] = self.shaped_inertia.resolve(
+            model["motor_inertia"], "law.shaped_inertia", robot
+        )
+        ratio = self.damping.ratio
+        damping = (
+            self.damping.full() if ratio is None else designed_damping(law.task, own, start, model, ratio)
+        )
+        return own | {"damping": damping}
+
+
+class RigidSettings(AbstractLawSettings):
     """The baseline: cancels the dynamics as if the joints were rigid."""
+
+    title: ClassVar[str] = "baseline for rigid joints"
+    shapes: ClassVar[bool] = False
 
     type: Literal["rigid"] = Field(description="the law: impedance (the paper's) or rigid (the baseline)")
     gravity: Literal["robot", "model"] = Field(
@@ -271,14 +154,29 @@ class RigidSettings(_LawSettings):
     def _holds_all(self) -> Self:
         if free := self.stiffness.free:
             what = "the rigid law gives every direction an inertia, and none can be free"
-            raise Mistakes((("stiffness",), f"{what}; got {_said(free)}; try law type: impedance"))
+            raise Mistakes((("stiffness",), f"{what}; got {axis_names(free)}; try law type: impedance"))
         return self
 
+    def build(self, robot: FlexibleJointRobot) -> AbstractLaw:
+        """Return the law. It cancels the weight by its model; its plant has gravity then."""
+        from passiflex.control.gravity import RobotGravity, StaticGravity
+        from passiflex.control.rigid import RigidImpedanceLaw
 
-def free_mistakes(gains: Stiffness | Damping, free: tuple[int, ...]) -> str:
-    """Return what is wrong with gains whose free axes need to be these; nothing if they are, or go by a ratio."""
-    if getattr(gains, "ratio", None) is not None or gains.free == free:
-        return ""
-    needs = f"zero in {_said(free)}" if free else "more than 0 in every direction"
-    what = f"needs {needs}, as the law's stiffness; got zero in {_said(gains.free)}"
-    return f"{what}; a free direction has neither stiffness nor damping: null_space_damping damps it"
+        carries = {"robot": RobotGravity, "model": StaticGravity}[self.gravity]
+        return RigidImpedanceLaw(robot, self._task(), carries())
+
+    def gains(self, law: AbstractLaw, model: Numbers, start: Posture) -> Numbers:
+        """Return the numbers of the law."""
+        from passiflex.control.damping_design import damping_from_ratio
+        from passiflex.control.gain_design import in_world, target_inertia
+
+        own, target = self._common(), self.target_inertia
+        world = in_world(own["stiffness"], start.pose.rotation)
+        if target.damping_ratio is not None:
+            inertia = target_inertia(world, self.damping.full(), target.damping_ratio)
+        else:
+            inertia = target.full()
+        ratio = self.damping.ratio
+        damping = self.damping.full() if ratio is None else damping_from_ratio(world, inertia, ratio)
+        carried = model["motor_inertia"] if self.motor_inertia == "carried" else np.zeros(law.robot.n)
+        return own | {"target_inertia": inertia, "damping": damping, "carried_inertia": carried}

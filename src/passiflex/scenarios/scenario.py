@@ -52,7 +52,8 @@ class Force(TimeSpan):
 
 
 def _own_tank(data: dict[str, Any]) -> TankSettings | None:
-    if not isinstance(data.get("law"), ImpedanceSettings):
+    law = data.get("law")
+    if law is None or not law.shapes:
         return None
     return TankSettings().completed("port" if data.get("control") else "paper")
 
@@ -145,7 +146,7 @@ class Scenario(Section):
     def _tank_of_the_law(cls, tank: TankSettings | None, info: ValidationInfo) -> TankSettings | None:
         if tank is None:
             return None
-        if isinstance(info.data.get("law"), RigidSettings):
+        if "law" in info.data and not info.data["law"].shapes:
             raise ValueError("only the impedance law has a tank; remove it, or take law type: impedance")
         sampled = info.data.get("control", "in error") is not None
         if not sampled and tank.kind not in (None, "paper"):
@@ -164,7 +165,7 @@ class Scenario(Section):
     def _control_of_the_law(cls, control: Control | None, info: ValidationInfo) -> Control | None:
         if control is None or "law" not in info.data:
             return control
-        if isinstance(info.data["law"], RigidSettings):
+        if not info.data["law"].shapes:
             if control.inner_loop == "matched":
                 raise Mistakes((("inner_loop",), "the rigid law has no inner loop; take plain"))
             return control

@@ -12,7 +12,9 @@ from passiflex.texts.section import Mistakes, Section
 
 Energy = Annotated[float, Quantity("J", least=0)]
 
-if TYPE_CHECKING:
+if TYPE_CHECKING:  # who reads a scenario needs no CasADi
+    from passiflex.sampled.tank import AbstractTank
+
     Kind = str
 else:
     Kind = Literal[tuple(SAMPLED)]
@@ -146,6 +148,12 @@ class TankSettings(Section):
         defaults = PORT_DEFAULTS if given.get("kind", kind) == "port" else PAPER_DEFAULTS
         made = type(self).model_validate({"kind": kind} | defaults | given)
         return type(self).model_construct(set(given), **dict(made))
+
+    def build(self) -> AbstractTank:
+        """Return the tank of a sampled run."""
+        from passiflex.sampled.tanks import TANKS
+
+        return TANKS[self.kind or "port"]()
 
     @property
     def signed(self) -> bool:

@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from passiflex.control.motion import MOTION, Motion, Pose, between, hold, pose_at, shifted
+from passiflex.control.posture import posture
 from passiflex.control.tank import jump_cost
 from passiflex.errors import SimulationError
 from passiflex.loops.closed_loop import ClosedLoop
 from passiflex.loops.compiled import CompiledLoop, compiled_loop
 from passiflex.native import Watched, fastest_pole
 from passiflex.native.stability import STABILITY_LIMIT
-from passiflex.problems.posture import posture
 from passiflex.problems.problem import Event, Problem, SampledProblem
 from passiflex.runs.run import Recorded, Run, assemble
 from passiflex.simulation.integrate import (

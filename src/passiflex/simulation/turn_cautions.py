@@ -14,7 +14,6 @@ import scipy.linalg
 from numpy.typing import NDArray
 
 from passiflex.control.motion import Motion, Pose, between, hold, pose_at
-from passiflex.control.task import PoseTask
 from passiflex.control.turning import held_angle, largest_moment, turning_moment
 from passiflex.problems.problem import Problem, SampledProblem
 
@@ -82,7 +81,7 @@ def large_moments(problem: Problem) -> tuple[str, ...]:
 
 def _instants(problem: Problem) -> Iterator[_Instant]:
     """Yield what is in force from each change on, in the order of time; nothing for a task without rotation."""
-    if not isinstance(problem.law.task, PoseTask) or not any(i >= 3 for i in problem.law.task.held):
+    if not problem.law.task.turns or not any(i >= 3 for i in problem.law.task.held):
         return
     gains = problem.law.layout.unpack(problem.gains)
     sampled = problem if isinstance(problem, SampledProblem) else None

@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from passiflex.control.posture import held_jacobian
 from passiflex.loops.compiled import compiled_sampled_loop, interpreted_sampled_loop
-from passiflex.problems.posture import held_jacobian
 from passiflex.problems.problem import Problem, require_sampled
 from passiflex.stability.exponential import exponential
 from passiflex.stability.law_slope import Gains, LawSlope, differences

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from passiflex.control.motion import Pose
+from passiflex.control.posture import Posture, posture
 from passiflex.loops.sampled_loop import SampledLoop
-from passiflex.problems.posture import Posture, posture
 from passiflex.problems.problem import SampledProblem
 from passiflex.sampled.rest import Rest
 

@@ -13,7 +13,6 @@ from passiflex.errors import PassiflexError
 from passiflex.problems.altered import altered, rewritten, with_flange
 from passiflex.problems.problem import Problem, require_sampled
 from passiflex.problems.resolution import resolve
-from passiflex.sampled.matched_loop import MatchedInnerLoop
 from passiflex.scenarios.scenario_file import parse_scenario
 from passiflex.stability.clock_words import hertz
 from passiflex.stability.judgement import Judgement, holds, judged_fallback
@@ -210,7 +209,7 @@ def _rate(t: Trial) -> Iterator[Remedy]:
 def _delay(t: Trial) -> Iterator[Remedy]:
     """Yield less delay, if the loop was not built for its own."""
     s = t.loop.problem
-    if isinstance(s.controller.inner, MatchedInnerLoop):
+    if s.controller.inner.predicts:
         return
     now = s.delay + s.jitter
     share = next((v for v in SHARES if now and t.stable(late=v * now)), None)
@@ -239,7 +238,7 @@ def _as_the_law(t: Trial) -> Iterator[Remedy]:
 def _other_loop(t: Trial) -> Iterator[Remedy]:
     if not t.shapes:
         return
-    matched = isinstance(t.loop.problem.controller.inner, MatchedInnerLoop)
+    matched = t.loop.problem.controller.inner.predicts
     inner = "plain" if matched else "matched"
     control = {"inner_loop": inner} | ({} if matched else {"external_torque": "none"})
     told = "" if matched else ", with external_torque: none"

@@ -10,7 +10,8 @@ from passiflex.passivity import audit
 from passiflex.responses.metrics import rms
 from passiflex.responses.steps import displacement
 from passiflex.scenarios.control_settings import Control, SensorSettings
-from passiflex.scenarios.law_settings import ImpedanceSettings, ShapedInertia, ShapedStiffness
+from passiflex.scenarios.gain_settings import ShapedInertia, ShapedStiffness
+from passiflex.scenarios.law_settings import ImpedanceSettings
 from passiflex.scenarios.scenario import Force
 from passiflex.simulation import Run, Scenario, resolve, simulate_problem
 from passiflex.studies.paper import Report, shipped_scenario

@@ -104,7 +104,7 @@ def _collect(
 
 
 def _step_point(v: Variant) -> dict[str, float]:
-    from passiflex.problems.gains import target_inertia
+    from passiflex.control.gain_design import target_inertia
 
     problem = resolve(v.scenario, v.robot)
     proposed = simulate_problem(problem)

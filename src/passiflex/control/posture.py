@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 
 from passiflex.control.motion import Pose
 from passiflex.control.task import AbstractTask
-from passiflex.errors import ValueRangeError
-from passiflex.problems.problem import Problem
 from passiflex.robots.arm import EndEffectorPose, SerialArm
 from passiflex.robots.flexible import FlexibleJointRobot
 
@@ -45,26 +43,6 @@ def held_jacobian(task: AbstractTask, at: Posture) -> Array:
     pose = EndEffectorPose(cs.SX(at.pose.position), cs.SX(at.pose.rotation))
     basis = np.array(cs.evalf(cs.densify(task.basis(pose))))
     return np.asarray(basis.T @ at.jacobian[: task.size])
-
-
-def natural_inertia(problem: Problem) -> Array:
-    """Return Λ of (31) at the start, with the numbers of the plant, in the directions that the task holds.
-
-    Raises
-    ------
-    ValueRangeError
-        If the posture is singular, where Λ is infinite.
-    """
-    robot = problem.law.robot
-    start = posture(robot, problem.q, robot.layout.unpack(problem.plant))
-    J = held_jacobian(problem.law.task, start)
-    mobility = J @ np.linalg.solve(start.mass_matrix, J.T)
-    if not np.linalg.cond(mobility) < 1 / SINGULAR**2:
-        raise ValueRangeError(
-            "posture is singular, where Λ is infinite", got=problem.q, try_="another posture"
-        )
-    inertia = np.linalg.inv(mobility)
-    return (inertia + inertia.T) / 2
 
 
 @lru_cache(maxsize=16)
