@@ -9,14 +9,7 @@
  * (n_hold / record_every + 1) rows in all. scratch holds 4*(n_x + n_q) + n_m numbers. Nothing is allocated here.
  * Returns n_hold, or the first period after which a number is not finite (or in which rhs failed);
  * the rows from there on are NaN. */
-typedef struct {
-    int (*f)(const double** arg, double** res, long long* iw, double* w, int memory);
-    int memory;
-    const double** arg;
-    double** res;
-    long long* iw;
-    double* w;
-} passiflex_callable;
+#include "callable.h"
 
 /* Show a watch one instant; w is n_m numbers, next has room for as many. */
 static int passiflex_look(
@@ -24,15 +17,11 @@ static int passiflex_look(
     const double* y, const double* u, const double* p)
 {
     if (!watch) return 0;
-    watch->arg[0] = w;
     watch->arg[1] = &time;
     watch->arg[2] = y;
     watch->arg[3] = u;
     watch->arg[4] = p;
-    watch->res[0] = next;
-    if (watch->f(watch->arg, watch->res, watch->iw, watch->w, watch->memory)) return 1;
-    for (long long i = 0; i < n_m; i++) w[i] = next[i];
-    return 0;
+    return passiflex_remember(watch, w, next, n_m);
 }
 
 /* Show a watch n_rows instants in a row: time i and row i of y, n numbers each. */
@@ -52,10 +41,8 @@ CASADI_SYMBOL_EXPORT long long passiflex_rk4(
     long long n_hold, long long substeps, double length, long long refined, long long split,
     long long record_every, double* out, double* scratch)
 {
-    static const double node[4] = {0.0, 0.5, 0.5, 1.0};
-    static const double weight[4] = {1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0};
     const long long n = n_x + n_q;
-    double *y = scratch, *stage = y + n, *slope = stage + n, *sum = slope + n, *next = sum + n;
+    double *y = scratch, *work = y + n, *next = work + 3 * n;
     double *end = out + (n_hold / record_every + 1) * n;
     long long period;
 
@@ -68,20 +55,9 @@ CASADI_SYMBOL_EXPORT long long passiflex_rk4(
         long long steps = substeps + fine * (split - 1);
         for (long long step = 0; step < steps && !bad; step++) {
             double h = step < fine * split ? length / split : length;
-            for (long long i = 0; i < n; i++) sum[i] = 0.0;
-            for (int s = 0; s < 4 && !bad; s++) {
-                for (long long i = 0; i < n_x; i++) stage[i] = s ? y[i] + h * node[s] * slope[i] : y[i];
-                rhs->arg[0] = stage;
-                rhs->arg[1] = u;
-                rhs->arg[2] = p;
-                rhs->res[0] = slope;
-                rhs->res[1] = slope + n_x;
-                bad = rhs->f(rhs->arg, rhs->res, rhs->iw, rhs->w, rhs->memory);
-                for (long long i = 0; i < n; i++) sum[i] += weight[s] * slope[i];
-            }
-            for (long long i = 0; i < n; i++) y[i] += h * sum[i];
+            bad = passiflex_step(rhs, n_x, n_q, y, u, p, h, work);
             double t = step < fine * split ? (step + 1) * h : (fine + (step + 1 - fine * split)) * h;
-            bad |= passiflex_look(watch, n_m, w, next, first + t, y, u, p_watch);
+            bad = bad || passiflex_look(watch, n_m, w, next, first + t, y, u, p_watch);
         }
         for (long long i = 0; i < n; i++) bad |= !isfinite(y[i]); /* once lost, a number never becomes finite again */
         if (bad) break;

@@ -12,47 +12,8 @@
  * A watch, if there is one, remembers w: look(w, time, y, command in force, c, z, p) -> w sees every sample after
  * control ran, and glance(w, time, y, p) -> w the end of every step of the plant. Nothing is allocated here.
  * Returns the number of samples done: n_rows, or the first at which a number was not finite. */
-typedef struct {
-    int (*f)(const double** arg, double** res, long long* iw, double* w, int memory);
-    int memory;
-    const double** arg;
-    double** res;
-    long long* iw;
-    double* w;
-} passiflex_callable;
-
-static int passiflex_plant_step(
-    const passiflex_callable* plant, long long n_x, long long n_q, double* y, const double* input,
-    const double* p, double h, double* scratch)
-{
-    static const double node[4] = {0.0, 0.5, 0.5, 1.0};
-    static const double weight[4] = {1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0};
-    const long long n = n_x + n_q;
-    double *stage = scratch, *slope = stage + n, *sum = slope + n;
-    for (long long i = 0; i < n; i++) sum[i] = 0.0;
-    for (int s = 0; s < 4; s++) {
-        for (long long i = 0; i < n_x; i++) stage[i] = s ? y[i] + h * node[s] * slope[i] : y[i];
-        plant->arg[0] = stage;
-        plant->arg[1] = input;
-        plant->arg[2] = p;
-        plant->res[0] = slope;
-        plant->res[1] = slope + n_x;
-        if (plant->f(plant->arg, plant->res, plant->iw, plant->w, plant->memory)) return 1;
-        for (long long i = 0; i < n; i++) sum[i] += weight[s] * slope[i];
-    }
-    for (long long i = 0; i < n; i++) y[i] += h * sum[i];
-    return 0;
-}
-
-/* Let a function of a watch remember w of n_w numbers; next has room for as many. */
-static int passiflex_remember(const passiflex_callable* f, double* w, double* next, long long n_w)
-{
-    f->arg[0] = w;
-    f->res[0] = next;
-    if (f->f(f->arg, f->res, f->iw, f->w, f->memory)) return 1;
-    for (long long i = 0; i < n_w; i++) w[i] = next[i];
-    return 0;
-}
+#include "callable.h"
+#include "commands.h"
 
 CASADI_SYMBOL_EXPORT long long passiflex_held_loop(
     const passiflex_callable* plant, const passiflex_callable* control,
@@ -67,8 +28,7 @@ CASADI_SYMBOL_EXPORT long long passiflex_held_loop(
     const long long n_m = sizes[7];
     const long long width = n + n_c + n_u + n_z;
     double *next = scratch, *command = next + n_c, *input = command + n_u;
-    double *work = input + n_u + n_s, *held = line + 1, *queue = held + n_u;
-    const long long entry = n_u + 1;
+    double *work = input + n_u + n_s, *held = line + 1;
     double now, *next_w = work + 3 * n;
 
     if (look) {
@@ -83,8 +43,6 @@ CASADI_SYMBOL_EXPORT long long passiflex_held_loop(
     for (long long k = 0; k < n_rows; k++) {
         const double *row = rows + k * n_w, start = (double)(first + k) * period;
         if (timing[2 * k + 1] != 0.0) {
-            long long waiting = (long long)line[0];
-            double arrival = timing[2 * k];
             control->arg[0] = y;
             control->arg[1] = c;
             control->arg[2] = row;
@@ -94,20 +52,11 @@ CASADI_SYMBOL_EXPORT long long passiflex_held_loop(
             control->res[2] = z;
             if (control->f(control->arg, control->res, control->iw, control->w, control->memory)) return k;
             for (long long i = 0; i < n_c; i++) c[i] = next[i];
-            if (waiting && queue[(waiting - 1) * entry] > arrival) arrival = queue[(waiting - 1) * entry];
-            queue[waiting * entry] = arrival;
-            for (long long i = 0; i < n_u; i++) queue[waiting * entry + 1 + i] = command[i];
-            line[0] = (double)(waiting + 1);
+            double* sent = command_sent(line, n_u, timing[2 * k]);
+            for (long long i = 0; i < n_u; i++) sent[i] = command[i];
         }
         for (double t = 0.0;;) {
-            long long waiting = (long long)line[0];
-            double until;
-            while (waiting && queue[0] <= t + 1e-9 * period) { /* the oldest command arrives */
-                for (long long i = 0; i < n_u; i++) held[i] = queue[1 + i];
-                waiting--;
-                for (long long i = 0; i < waiting * entry; i++) queue[i] = queue[i + entry];
-            }
-            line[0] = (double)waiting;
+            commands_received(line, n_u, t, period);
             now = start;
             if (look && t == 0.0 && passiflex_remember(look, w, next_w, n_m)) return k;
             if (t == 0.0 && k % record_every == 0) {
@@ -117,20 +66,19 @@ CASADI_SYMBOL_EXPORT long long passiflex_held_loop(
                 for (long long i = 0; i < n_z; i++) *out++ = z[i];
             }
             if (k >= steps || t >= period) break;
-            until = waiting && queue[0] < period ? queue[0] : period;
-            long long count = (long long)ceil((until - t) / longest * (1.0 - 1e-12));
-            if (count < 1) count = 1;
+            const double until = command_until(line, n_u, period);
+            const long long count = even_steps(until - t, longest);
             for (long long i = 0; i < n_u; i++) input[i] = held[i];
             for (long long i = 0; i < n_s; i++) input[n_u + i] = row[i];
             const double h = (until - t) / count;
             for (long long i = 0; i < count; i++) {
-                if (passiflex_plant_step(plant, n_x, n_q, y, input, p_plant, h, work)) return k;
+                if (passiflex_step(plant, n_x, n_q, y, input, p_plant, h, work)) return k;
                 now = start + (t + (i + 1) * h);
                 if (look && passiflex_remember(glance, w, next_w, n_m)) return k;
             }
             t = until;
         }
-        for (long long i = 0; i < (long long)line[0]; i++) queue[i * entry] -= period;
+        commands_later(line, n_u, period);
         for (long long i = 0; i < n; i++)
             if (!isfinite(y[i])) return k;
     }

@@ -13,6 +13,9 @@
  * truth, row). Nothing is allocated here. A lane whose y leaves the finite numbers goes on as it is, and
  * disturbs no other; completed[lane] is the sample at which that happened, else n_rows; whole[lane] is how
  * many recorded samples came before the first of which any number, kept or not, is not finite. */
+#include "commands.h"
+#include "runge_kutta.h"
+
 typedef struct {
     long long first, n_rows, steps, record_every, n_changes, n_kept;
     double period;
@@ -40,50 +43,24 @@ typedef struct {
 
 static void lane_step(lanes* y, const lanes* input, const lanes* p, lanes h, lane_bits moving)
 {
-    static const double node[4] = {0.0, 0.5, 0.5, 1.0};
-    static const double weight[4] = {1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0};
     lanes stage[N_X], slope[N_Y], sum[N_Y];
-    for (int i = 0; i < N_Y; i++) sum[i] = all_lanes(0.0);
-    for (int s = 0; s < 4; s++) {
-        for (int i = 0; i < N_X; i++) stage[i] = s ? y[i] + h * node[s] * slope[i] : y[i];
-        PLANT(stage, input, p, slope, slope + N_X);
-        for (int i = 0; i < N_Y; i++) sum[i] += weight[s] * slope[i];
-    }
+    RUNGE_KUTTA_STAGES(N_X, N_Y, y, h, all_lanes(0.0), stage, slope, sum,
+        PLANT(stage, input, p, slope, slope + N_X));
     for (int i = 0; i < N_Y; i++) y[i] = where(moving, y[i] + h * sum[i], y[i]);
-}
-
-/* Put a lane's newest command into its line. */
-static void lane_send(double* line, const lanes* command, int l, double delay)
-{
-    double* queue = line + 1 + N_U;
-    const long long waiting = (long long)line[0];
-    double* last = queue + waiting * ENTRY;
-    last[0] = waiting && last[-ENTRY] > delay ? last[-ENTRY] : delay;
-    for (int i = 0; i < N_U; i++) last[1 + i] = LANE(command[i], l);
-    line[0] = (double)(waiting + 1);
 }
 
 /* Take what has arrived by now, and write the command in force into the lane. */
 static void lane_receive(double* line, lanes* held, int l, double now, double period)
 {
-    double* queue = line + 1 + N_U;
-    long long waiting = (long long)line[0];
-    while (waiting && queue[0] <= now + 1e-9 * period) {
-        memcpy(line + 1, queue + 1, N_U * sizeof(double));
-        waiting--;
-        memmove(queue, queue + ENTRY, waiting * ENTRY * sizeof(double));
-    }
-    line[0] = (double)waiting;
+    commands_received(line, N_U, now, period);
     for (int i = 0; i < N_U; i++) LANE(held[i], l) = line[1 + i];
 }
 
 /* Plan the equal steps to a lane's next arrival, or to the end of its period. */
 static void lane_plan(lane_clock* clock, const double* line, double period, double longest)
 {
-    const double next = line[1 + N_U];
-    clock->until = line[0] != 0.0 && next < period ? next : period;
-    clock->left = (long long)ceil((clock->until - clock->t) / longest * (1.0 - 1e-12));
-    if (clock->left < 1) clock->left = 1;
+    clock->until = command_until(line, N_U, period);
+    clock->left = even_steps(clock->until - clock->t, longest);
     clock->h = (clock->until - clock->t) / clock->left;
     clock->done = 0;
 }
@@ -175,7 +152,10 @@ LANE_EXPORT void passiflex_lane_loop(const passiflex_lane_run* r)
         for (int i = 0; i < N_S; i++) input[N_U + i] = row[i];
         EACH_LANE
         {
-            if (timing[LANES + l] != 0.0) lane_send(r->line + l * LINE, command, l, timing[l]);
+            if (timing[LANES + l] != 0.0) {
+                double* sent = command_sent(r->line + l * LINE, N_U, timing[l]);
+                for (int i = 0; i < N_U; i++) sent[i] = LANE(command[i], l);
+            }
             lane_receive(r->line + l * LINE, input, l, 0.0, r->period);
         }
         lane_look(r, input, time, whole);
@@ -197,8 +177,7 @@ LANE_EXPORT void passiflex_lane_loop(const passiflex_lane_run* r)
         whole = lane_whole(r->y);
         EACH_LANE
         {
-            double* line = r->line + l * LINE;
-            for (long long i = 0; i < (long long)line[0]; i++) line[1 + N_U + i * ENTRY] -= r->period;
+            commands_later(r->line + l * LINE, N_U, r->period);
             if (r->completed[l] < r->n_rows) continue;
             if (!LANE(whole, l)) r->completed[l] = k;
             alive |= LANE(whole, l) != 0;

@@ -39,6 +39,7 @@ from passiflex.native.compiler import SUFFIX, Compiler, find_compiler
 
 WRITABLE = "set PASSIFLEX_CACHE to a folder that can be written"
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}")
+_INCLUDED = re.compile(r'^#include "(.*)"$', re.MULTILINE)
 
 
 def compile_functions(functions: Sequence[cs.Function], *, driver: str = "") -> Path | None:
@@ -110,8 +111,9 @@ def generate(functions: Sequence[cs.Function], driver: str = "") -> str:
 
 
 def c_source(name: str) -> str:
-    """Return the text of one of the C files of this folder."""
-    return resources.files("passiflex.native").joinpath(name).read_text(encoding="utf-8")
+    """Return the text of one of the C files of this folder, with those that it includes in their places."""
+    text = resources.files("passiflex.native").joinpath(name).read_text(encoding="utf-8")
+    return _INCLUDED.sub(lambda found: c_source(found[1]), text)
 
 
 def _check_names(names: list[str]) -> None:
