@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from functools import cached_property
 from types import SimpleNamespace
-from typing import NamedTuple, final
+from typing import final
 
 import casadi as cs
 
 from passiflex.control.law import AbstractLaw, Stored
-from passiflex.control.signals import Measurement, Reference
+from passiflex.control.signals import Command, Measurement, Reference
 from passiflex.layout import Field, Layout
 from passiflex.parts import Parts
 from passiflex.robots.arm import EndEffectorPose
@@ -18,25 +18,20 @@ from passiflex.sampled.actions import action_layout, posture_spring, tracking_wr
 from passiflex.sampled.external import AbstractExternalTorque, Known, TrueTorque
 from passiflex.sampled.governor import govern_pose, govern_stiffness
 from passiflex.sampled.inner_loop import AbstractInnerLoop, PlainInnerLoop
-from passiflex.sampled.measurement_bound import booked_bound, bound_state, error_layout, sure, sure_state
-from passiflex.sampled.period_state import period_start, period_state
+from passiflex.sampled.measurement_bound import (
+    booked_bound,
+    bound_state,
+    error_layout,
+    sure_state,
+)
+from passiflex.sampled.period import Force, Granted, Read, Settled
+from passiflex.sampled.period_state import period_after, period_start, period_state
 from passiflex.sampled.rest import Remembered, Rest
 from passiflex.sampled.signals import ControlParameters, LedgerEntry, PeriodResult, Setpoint
-from passiflex.sampled.tank import AbstractTank, PeriodFlows, TankEntry, added, finite, unchanged
+from passiflex.sampled.tank import AbstractTank, PeriodFlows, added, finite, unchanged
 
 LARGEST_READING = 1e30
 """A reading beyond it is no measurement: its energy could not be told from infinity."""
-
-
-class _Granted(NamedTuple):
-    """The reference and stiffness in force, with what they cost."""
-
-    pose: EndEffectorPose
-    stiffness: cs.SX
-    pose_share: cs.SX
-    stiffness_share: cs.SX
-    cost: cs.SX
-    entry: TankEntry
 
 
 @final
@@ -44,10 +39,10 @@ class _Granted(NamedTuple):
 class SampledController:
     """A law with its tank, governor, gated actions and fallback, once per period.
 
-    In this order, within one period: the tank settles what the period before took or gave; if it is
-    overdrawn by then, the law falls back for good; the governor grants what the tank can pay of the new
-    reference; the valve opens as far as the level allows; the law commands. Without a tank nothing is
-    governed or gated, and the port's energy is only counted.
+    In this order, within one period, each a method: estimators believe what was read; the tank settles what the
+    period before took or gave; if it is overdrawn by then, the law falls back for good; the governor grants what the
+    tank can pay of the new reference; the valve opens as far as the level allows; the law commands. Without a tank
+    nothing is governed or gated, and the port's energy is only counted.
     """
 
     law: AbstractLaw
@@ -101,146 +96,144 @@ class SampledController:
 
         `applied` (n,) is the torque that the motors were told then, after their limits.
         """
-        arm, s = self.law.robot.arm, self.state.view(state)
+        s = self.state.view(state)
         ok = finite(elapsed, applied, *y, *setpoint.pose, *setpoint[1:], below=LARGEST_READING)
-        elapsed = s.lost_time + cs.if_else(finite(elapsed, below=LARGEST_READING), elapsed, 0)
-        y, observed = self.external.estimate(y, elapsed, Known(arm, p.model, p.observer.bandwidth), s)
-        y, seen = self.inner.see(y, applied, elapsed, s, p.model, p.inner)
-        first = s.running < 1
-
-        held = EndEffectorPose(s.governed_position, s.governed_rotation)
-        before = self.law.stored(y, p.model, _chosen(s.latched, p.fallback, p.gains))
-        storage = before.energy + self._potential(before, held, s.held_stiffness)
-        variable = self._potential(before, held, s.held_stiffness - p.gains.stiffness)
-        work = cs.if_else(first, 0, cs.dot(s.last_tau_a + y.tau_a, y.q - s.last_q) / 2)
-        flows = PeriodFlows(
-            elapsed=elapsed,
-            port_energy=work,
-            storage_change=cs.if_else(first, 0, storage - s.law_storage),
-            claimed_loss=s.claimed_power * elapsed,
-            claimed_cartesian_loss=s.claimed_cartesian_power * elapsed,
-            variable_spring_work=cs.if_else(first, 0, variable - s.variable_potential),
-        )
-        settled = self.tank.settle(s.tank_energy, flows, p.tank) if self.tank else unchanged(s.tank_energy)
-
-        bound = booked_bound(y, elapsed, first, s, p.errors)
-        doubt = bound.total if self.tank is not None and self.tank.measures else cs.SX(0)
-
-        is_sure = cs.logic_or(first, settled.level - bound.total >= p.tank.tank_floor)
-
-        # Fall back in the period in which it shows beyond what the sensors explain, and keep T + S.
-        falls = self.tank is not None and self.tank.falls_back
-        short = settled.level + bound.lowered < p.tank.tank_trip + s.sure_measurement_bound
-        overdrawn = cs.logic_and(short, s.latched < 1) if falls else cs.SX(0)
-        latched = cs.fmax(s.latched, overdrawn)
-        g = _chosen(latched, p.fallback, p.gains)
-        now = self.law.stored(y, p.model, g)
-        held = _pose(overdrawn, now.pose, held)
-        held_stiffness = cs.if_else(overdrawn, p.fallback.stiffness, s.held_stiffness)
-        restored = cs.if_else(overdrawn, now.energy, storage)  # the spring is slack at the pose just read
-        rebased, lowest = cs.if_else(overdrawn, storage - restored, 0), settled.level
-        settled = settled._replace(level=settled.level + rebased)
-
-        granted = self._grant(now, held, held_stiffness, setpoint, latched, settled.level, doubt, elapsed, p)
-        valve = (
-            (1 - latched) * self.tank.valve(granted.entry.level - doubt, p.tank) if self.tank else cs.SX(1)
-        )
-        g.stiffness, g.damping = granted.stiffness, cs.if_else(latched, p.fallback.damping, setpoint.damping)
-        torque = cs.SX.zeros(self.law.robot.n)
-        if self.actions:
-            torque += valve * self._actions(y, now, setpoint, granted, g, p)
-        if self.tank:
-            brake = self.tank.braking(granted.entry.level, cs.dot(now.dphi, now.dphi), elapsed, p.tank)
-            torque -= brake * now.dphi
-        reference, memory = Reference(granted.pose, setpoint.velocity), self.inner.state(self.law.robot.n)
-        command = self.inner.command(self.law, y, reference, p.model, g, torque, memory.view(seen), p.inner)
-
-        tank = added(settled, granted.entry)
-        held_back = cs.logic_or(granted.pose_share < 1, granted.stiffness_share < 1)
-        values = {
-            "governed_position": granted.pose.position,
-            "governed_rotation": granted.pose.rotation,
-            "held_stiffness": granted.stiffness,
-            "tank_energy": tank.level,
-            "law_storage": restored + granted.cost,
-            "variable_potential": self._potential(now, granted.pose, granted.stiffness - p.gains.stiffness),
-            "claimed_power": command.energy.dissipated_power,
-            "claimed_cartesian_power": command.energy.cartesian_damping,
-            "last_q": y.q,
-            "last_tau_a": y.tau_a,
-            "last_command": command.tau_m,
-            "running": 1,
-            "latched": latched,
-            "measured_port_energy": s.measured_port_energy + work,
-            "reference_energy": s.reference_energy + granted.cost,
-            "granted_energy": s.granted_energy + tank.granted,
-            "drawn_energy": s.drawn_energy + tank.drawn,
-            "refilled_energy": s.refilled_energy + tank.refilled,
-            "spilled_energy": s.spilled_energy + tank.spilled,
-            "rebased_energy": s.rebased_energy + rebased,
-            "lowest_level": cs.fmin(s.lowest_level, cs.fmin(lowest, tank.level)),
-            "governed_time": s.governed_time + cs.if_else(held_back, elapsed, 0),
-            "faults": s.faults + cs.fmin(tank.fault, 1),
-            "lost_time": 0,
-            **bound.state,
-            **sure(is_sure, y.q, s, bound.state),
-        }
+        read = self._read(y, applied, elapsed, s, p)
+        force = self._in_force(read, self._settle(read, s, p), s, p)
+        granted = self._grant(read, force, setpoint, p)
+        command, valve = self._command(read, force, granted, setpoint, p)
+        variable = self._potential(force.now, granted.pose, granted.stiffness - p.gains.stiffness)
+        values = period_after(read, force, granted, command, variable, p.tank.tank_floor, s)
         own = Layout(self.state.fields[: len(values)])
-        after = cs.vertcat(own.stack(values), observed, seen)
-        faulty = self.state.stack(vars(s) | {"faults": s.faults + 1, "lost_time": elapsed})
+        after = cs.vertcat(own.stack(values), read.observed, read.seen)
+        faulty = self.state.stack(vars(s) | {"faults": s.faults + 1, "lost_time": read.elapsed})
+        safe = command._replace(tau_m=cs.if_else(ok, command.tau_m, s.last_command))
         entry = LedgerEntry(
-            tank=tank,
-            rebased=rebased,
-            port_energy=work,
-            storage=restored + granted.cost,
+            tank=added(force.tank, granted.entry),
+            rebased=force.rebased,
+            port_energy=force.work,
+            storage=force.storage + granted.cost,
             reference_share=granted.pose_share,
             stiffness_share=granted.stiffness_share,
             valve=valve,
-            latched=latched,
-            bound=bound.total,
+            latched=force.latched,
+            bound=read.bound.total,
             fault=1 - ok,
         )
-        safe = command._replace(tau_m=cs.if_else(ok, command.tau_m, s.last_command))
-        return PeriodResult(safe, cs.if_else(ok, after, faulty), entry, y)
+        return PeriodResult(safe, cs.if_else(ok, after, faulty), entry, read.y)
+
+    def _read(
+        self,
+        y: Measurement,
+        applied: cs.SX,
+        elapsed: cs.SX,
+        s: SimpleNamespace,
+        p: ControlParameters[SimpleNamespace],
+    ) -> Read:
+        """Return the measurement as estimators and inner loop believe it."""
+        elapsed = s.lost_time + cs.if_else(finite(elapsed, below=LARGEST_READING), elapsed, 0)
+        known = Known(self.law.robot.arm, p.model, p.observer.bandwidth)
+        y, observed = self.external.estimate(y, elapsed, known, s)
+        y, seen = self.inner.see(y, applied, elapsed, s, p.model, p.inner)
+        first = s.running < 1
+        return Read(y, elapsed, first, observed, seen, booked_bound(y, elapsed, first, s, p.errors))
+
+    def _settle(self, r: Read, s: SimpleNamespace, p: ControlParameters[SimpleNamespace]) -> Settled:
+        """Return the books after what the period before took or gave."""
+        held = EndEffectorPose(s.governed_position, s.governed_rotation)
+        before = self.law.stored(r.y, p.model, _chosen(s.latched, p.fallback, p.gains))
+        storage = before.energy + self._potential(before, held, s.held_stiffness)
+        variable = self._potential(before, held, s.held_stiffness - p.gains.stiffness)
+        work = cs.if_else(r.first, 0, cs.dot(s.last_tau_a + r.y.tau_a, r.y.q - s.last_q) / 2)
+        flows = PeriodFlows(
+            elapsed=r.elapsed,
+            port_energy=work,
+            storage_change=cs.if_else(r.first, 0, storage - s.law_storage),
+            claimed_loss=s.claimed_power * r.elapsed,
+            claimed_cartesian_loss=s.claimed_cartesian_power * r.elapsed,
+            variable_spring_work=cs.if_else(r.first, 0, variable - s.variable_potential),
+        )
+        settled = self.tank.settle(s.tank_energy, flows, p.tank) if self.tank else unchanged(s.tank_energy)
+        return Settled(settled, work, storage, held)
+
+    def _in_force(
+        self, r: Read, settled: Settled, s: SimpleNamespace, p: ControlParameters[SimpleNamespace]
+    ) -> Force:
+        """Return what is in force: the fallback from the period on in which the tank is overdrawn, T + S kept.
+
+        It is overdrawn if its level shows it beyond what the sensors explain.
+        """
+        tank, bound = settled.tank, r.bound
+        falls = self.tank is not None and self.tank.falls_back
+        short = tank.level + bound.lowered < p.tank.tank_trip + s.sure_measurement_bound
+        overdrawn = cs.logic_and(short, s.latched < 1) if falls else cs.SX(0)
+        latched = cs.fmax(s.latched, overdrawn)
+        gains = _chosen(latched, p.fallback, p.gains)
+        now = self.law.stored(r.y, p.model, gains)
+        restored = cs.if_else(overdrawn, now.energy, settled.storage)  # slack at the pose just read
+        rebased = cs.if_else(overdrawn, settled.storage - restored, 0)
+        return Force(
+            now=now,
+            gains=gains,
+            latched=latched,
+            held=_pose(overdrawn, now.pose, settled.held),
+            held_stiffness=cs.if_else(overdrawn, p.fallback.stiffness, s.held_stiffness),
+            storage=restored,
+            rebased=rebased,
+            tank=tank._replace(level=tank.level + rebased),
+            lowest=tank.level,
+            work=settled.work,
+            doubt=bound.total if self.tank is not None and self.tank.measures else cs.SX(0),
+        )
+
+    def _command(
+        self,
+        r: Read,
+        f: Force,
+        granted: Granted,
+        setpoint: Setpoint,
+        p: ControlParameters[SimpleNamespace],
+    ) -> tuple[Command, cs.SX]:
+        """Return the law's command with what the valve lets through, and the valve."""
+        level = granted.entry.level
+        valve = (1 - f.latched) * self.tank.valve(level - f.doubt, p.tank) if self.tank else cs.SX(1)
+        g = f.gains
+        g.stiffness = granted.stiffness
+        g.damping = cs.if_else(f.latched, p.fallback.damping, setpoint.damping)
+        torque = cs.SX.zeros(self.law.robot.n)
+        if self.actions:
+            torque += valve * self._actions(r.y, f.now, setpoint, granted, g, p)
+        if self.tank:
+            torque -= self.tank.braking(level, cs.dot(f.now.dphi, f.now.dphi), r.elapsed, p.tank) * f.now.dphi
+        reference, memory = Reference(granted.pose, setpoint.velocity), self.inner.state(self.law.robot.n)
+        command = self.inner.command(
+            self.law, r.y, reference, p.model, g, torque, memory.view(r.seen), p.inner
+        )
+        return command, valve
 
     def _potential(self, at: Stored, reference: EndEffectorPose, stiffness: cs.SX) -> cs.SX:
         return self.law.task.potential(at.pose, reference, stiffness)
 
-    def _grant(
-        self,
-        now: Stored,
-        held: EndEffectorPose,
-        held_stiffness: cs.SX,
-        setpoint: Setpoint,
-        latched: cs.SX,
-        level: cs.SX,
-        doubt: cs.SX,
-        elapsed: cs.SX,
-        p: ControlParameters[SimpleNamespace],
-    ) -> _Granted:
+    def _grant(self, r: Read, f: Force, setpoint: Setpoint, p: ControlParameters[SimpleNamespace]) -> Granted:
         """Return the reference as far as the tank surely pays for it; a law that has fallen back holds its own."""
-        one = cs.SX(1)
+        one, level = cs.SX(1), f.tank.level
         if self.tank is None:
-            stored = self._potential(now, setpoint.pose, setpoint.stiffness)
-            cost = stored - self._potential(now, held, held_stiffness)
-            return _Granted(setpoint.pose, setpoint.stiffness, one, one, cost, unchanged(level))
+            stored = self._potential(f.now, setpoint.pose, setpoint.stiffness)
+            cost = stored - self._potential(f.now, f.held, f.held_stiffness)
+            return Granted(setpoint.pose, setpoint.stiffness, one, one, cost, unchanged(level))
         task, tank = self.law.task, self.tank
-        share = tank.stiffness_share(level - doubt, p.tank)
-        wanted = cs.if_else(
-            share < 1,
-            p.gains.stiffness + share * (setpoint.stiffness - p.gains.stiffness),
-            setpoint.stiffness,
-        )
-        wanted = cs.if_else(latched, held_stiffness, wanted)
+        share, base = tank.stiffness_share(level - f.doubt, p.tank), p.gains.stiffness
+        wanted = cs.if_else(share < 1, base + share * (setpoint.stiffness - base), setpoint.stiffness)
+        wanted = cs.if_else(f.latched, f.held_stiffness, wanted)
         signed = p.tank.tank_signed
-        budget = tank.budget(level - doubt, elapsed, p.tank)
-        stiffness = govern_stiffness(task, now.pose, held, held_stiffness, wanted, budget, signed)
+        budget = tank.budget(level - f.doubt, r.elapsed, p.tank)
+        stiffness = govern_stiffness(task, f.now.pose, f.held, f.held_stiffness, wanted, budget, signed)
         first = tank.pay(level, stiffness.cost, p.tank)
         budget = cs.fmax(budget - first.granted, 0)
-        goal = _pose(latched, held, setpoint.pose)
-        pose = govern_pose(task, now.pose, held, goal, stiffness.value, budget, signed)
+        goal = _pose(f.latched, f.held, setpoint.pose)
+        pose = govern_pose(task, f.now.pose, f.held, goal, stiffness.value, budget, signed)
         second = tank.pay(first.level, pose.cost, p.tank)
-        return _Granted(
+        return Granted(
             pose=pose.value,
             stiffness=stiffness.value,
             pose_share=pose.share,
@@ -254,7 +247,7 @@ class SampledController:
         y: Measurement,
         now: Stored,
         setpoint: Setpoint,
-        granted: _Granted,
+        granted: Granted,
         g: SimpleNamespace,
         p: ControlParameters[SimpleNamespace],
     ) -> cs.SX:

@@ -2,8 +2,16 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
+import casadi as cs
+
+from passiflex.control.signals import Command
 from passiflex.layout import Field, Layout
+from passiflex.sampled.measurement_bound import sure
+from passiflex.sampled.period import Force, Granted, Read
 from passiflex.sampled.rest import Remembered, Rest
+from passiflex.sampled.tank import added
 
 
 def period_state(n: int, k: int) -> Layout:
@@ -61,4 +69,41 @@ def period_start(n: int, k: int, at: Rest) -> Remembered:
         "last_q": at.running * at.q,
         "last_tau_a": at.running * at.tau_a,
         "last_command": at.command,
+    }
+
+
+def period_after(
+    r: Read, f: Force, granted: Granted, command: Command, variable: cs.SX, floor: cs.SX, s: SimpleNamespace
+) -> dict[str, cs.SX]:
+    """Return their values after a period; `variable` is U(K_x) − U(K_base), `floor` that of the tank."""
+    tank = added(f.tank, granted.entry)
+    held_back = cs.logic_or(granted.pose_share < 1, granted.stiffness_share < 1)
+    is_sure = cs.logic_or(r.first, f.lowest - r.bound.total >= floor)
+    return {
+        "governed_position": granted.pose.position,
+        "governed_rotation": granted.pose.rotation,
+        "held_stiffness": granted.stiffness,
+        "tank_energy": tank.level,
+        "law_storage": f.storage + granted.cost,
+        "variable_potential": variable,
+        "claimed_power": command.energy.dissipated_power,
+        "claimed_cartesian_power": command.energy.cartesian_damping,
+        "last_q": r.y.q,
+        "last_tau_a": r.y.tau_a,
+        "last_command": command.tau_m,
+        "running": 1,
+        "latched": f.latched,
+        "measured_port_energy": s.measured_port_energy + f.work,
+        "reference_energy": s.reference_energy + granted.cost,
+        "granted_energy": s.granted_energy + tank.granted,
+        "drawn_energy": s.drawn_energy + tank.drawn,
+        "refilled_energy": s.refilled_energy + tank.refilled,
+        "spilled_energy": s.spilled_energy + tank.spilled,
+        "rebased_energy": s.rebased_energy + f.rebased,
+        "lowest_level": cs.fmin(s.lowest_level, cs.fmin(f.lowest, tank.level)),
+        "governed_time": s.governed_time + cs.if_else(held_back, r.elapsed, 0),
+        "faults": s.faults + cs.fmin(tank.fault, 1),
+        "lost_time": 0,
+        **r.bound.state,
+        **sure(is_sure, r.y.q, s, r.bound.state),
     }

@@ -1,0 +1,61 @@
+"""What one control period passes from step to step: what was read, what settled, what is in force, what was granted."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import NamedTuple
+
+import casadi as cs
+
+from passiflex.control.law import Stored
+from passiflex.control.signals import Measurement
+from passiflex.robots.arm import EndEffectorPose
+from passiflex.sampled.measurement_bound import Bound
+from passiflex.sampled.tank import TankEntry
+
+
+class Read(NamedTuple):
+    """The measurement as the law believes it, the time since the last one, what is remembered of it, and its doubt."""
+
+    y: Measurement
+    elapsed: cs.SX
+    first: cs.SX
+    observed: cs.SX
+    seen: cs.SX
+    bound: Bound
+
+
+class Settled(NamedTuple):
+    """The tank after the period before, w of that period, S at the reference then, which is `held`."""
+
+    tank: TankEntry
+    work: cs.SX
+    storage: cs.SX
+    held: EndEffectorPose
+
+
+class Force(NamedTuple):
+    """What is in force after settling: the law's gains or the fallback's, the reference held, and the books."""
+
+    now: Stored
+    gains: SimpleNamespace
+    latched: cs.SX
+    held: EndEffectorPose
+    held_stiffness: cs.SX
+    storage: cs.SX
+    rebased: cs.SX
+    tank: TankEntry
+    lowest: cs.SX
+    work: cs.SX
+    doubt: cs.SX
+
+
+class Granted(NamedTuple):
+    """The reference and stiffness in force, with what they cost."""
+
+    pose: EndEffectorPose
+    stiffness: cs.SX
+    pose_share: cs.SX
+    stiffness_share: cs.SX
+    cost: cs.SX
+    entry: TankEntry
