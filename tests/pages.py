@@ -130,6 +130,8 @@ def _run(block: Block, above: str, shell: Shell, capsys: pytest.CaptureFixture[s
             assert printed(block.text).search(above), f"not what was printed:\n{above}"
         case "yaml":
             validate(block.text, Path())
+        case "toml":
+            tomllib.loads(block.text)
         case other:
             raise AssertionError(f"no test knows what a block of {other or 'no language'} is")
     return ""

@@ -25,6 +25,8 @@ SAYS = {
     "own_tank": "passive",
     "own_element": r"\de-\d\d",
     "own_law": "passive",
+    "own_sensor": r"passive 0\.\d+",
+    "own_motion": r"passive 0\.0[67]",
 }
 """What of its answer can be known beforehand."""
 

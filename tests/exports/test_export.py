@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import sys
+from importlib.metadata import EntryPoint
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 
 from passiflex.errors import NameUnknownError
 from passiflex.exports import export_run
-from passiflex.exports.export import FORMATS
+from passiflex.exports.export import FORMATS, GROUP
 from passiflex.exports.extras import MissingExtraError
 from passiflex.files import OutputError
 from passiflex.simulation import Run
@@ -50,3 +52,18 @@ def test_a_place_that_cannot_be_written_says_so(run: Run, tmp_path: Path) -> Non
     (tmp_path / "file").write_text("")
     with pytest.raises(OutputError, match=r"cannot write .*run\.csv"):
         export_run(run, tmp_path / "file" / "run.csv")
+
+
+def test_another_package_brings_an_ending(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """By an entry point, which is loaded where a run is written; it cannot take the place of ours."""
+    module = ModuleType("somebodys_format")
+    module.write = lambda run, path: path.write_text(run.name)  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, "somebodys_format", module)
+    points = [EntryPoint(ending, "somebodys_format:write", GROUP) for ending in (".txt", ".csv")]
+    monkeypatch.setattr(
+        "passiflex.exports.export.entry_points", lambda group: points if group == GROUP else []
+    )
+    assert export_run(run, tmp_path / "run.txt").read_text() == run.name
+    assert export_run(run, tmp_path / "run.csv").read_text() != run.name
+    with pytest.raises(NameUnknownError, match=r"'\.txt'"):
+        export_run(run, tmp_path / "run.text")

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 import passiflex as pf
 from passiflex.control.gravity import AbstractGravity, RobotGravity
 from passiflex.control.law import AbstractLaw, Array, ImpedanceLaw
+from passiflex.control.motion import Motion, Pose, hold
 from passiflex.control.signals import Command, Measurement, Reference, Stored
 from passiflex.control.task import AbstractTask
 from passiflex.elements import AbstractElement, Effect, Touch, nothing
@@ -22,9 +23,13 @@ from passiflex.errors import ArgumentError, NameUnknownError, SizeError, ValueRa
 from passiflex.layout import Field, Layout
 from passiflex.problems.own_parts import with_parts
 from passiflex.robots.flexible import FlexibleJointRobot
+from passiflex.sampled.rest import Remembered, Rest
+from passiflex.sampled.sensors import AbstractSensorEffect, Reading
 from passiflex.sampled.tank import AbstractTank, PeriodFlows
 from passiflex.sampled.tanks import PortTank
+from passiflex.scenarios.reference import AbstractReferenceEvent
 from passiflex.simulation import resolve
+from passiflex.stability.linear_loop import LinearLoop
 from worlds import world
 
 PUSH = [{"from": 0.05, "to": 0.15, "force": [0, 0, 10]}]
@@ -186,3 +191,93 @@ def test_what_does_not_fit_is_said() -> None:
         with pytest.raises(error, match=message):
             wrong()
     assert with_parts(problem) is problem
+
+
+@dataclass(frozen=True)
+class Warming(AbstractSensorEffect):
+    """An offset of τ_a that creeps up, by `rate` [N m/s], from the first reading on."""
+
+    rate: float
+
+    def state(self, n: int) -> Layout:
+        return Layout((Field("warming_offset", (), "N m", "of every joint torque sensor"),))
+
+    def read(self, y: Measurement, elapsed: cs.SX, s: SimpleNamespace) -> Reading:
+        offset = s.warming_offset + self.rate * elapsed
+        return Reading(y._replace(tau_a=y.tau_a + offset), offset)
+
+
+def test_a_sensor_effect_of_ones_own_has_a_memory() -> None:
+    scenario = world(**SHORT)
+    ours, theirs = pf.simulate(scenario, sensors=[Warming(2.0)]), pf.simulate(scenario)
+    np.testing.assert_allclose(ours["warming_offset"], 2.0 * (ours.time + 1e-3), rtol=1e-9)
+    off = ours["measured_tau_a"] - ours["tau_a"]
+    np.testing.assert_allclose(off[50:], (2.0 * (ours.time + 1e-3))[50:, None] * np.ones(2), rtol=1e-6)
+    assert np.abs(ours["q"] - theirs["q"]).max() > 1e-4
+    none = pf.simulate(scenario, sensors=[Warming(0.0)])
+    np.testing.assert_allclose(none["q"], theirs["q"], atol=1e-13)
+    assert theirs.data.attrs["seed"] == none.data.attrs["seed"]
+
+
+def test_the_linear_loop_knows_a_sensor_effect() -> None:
+    """A slow pole in the torque readings takes a loop that holds to where it does not; and the judge says so."""
+
+    @dataclass(frozen=True)
+    class Slow(AbstractSensorEffect):
+        pole: float
+
+        def state(self, n: int) -> Layout:
+            return Layout((Field("slow_tau_a", (n,), "N m", acts=True, kept=False),))
+
+        def start(self, at: Rest) -> Remembered:
+            return {"slow_tau_a": at.running * at.tau_a}
+
+        def read(self, y: Measurement, elapsed: cs.SX, s: SimpleNamespace) -> Reading:
+            slow = s.slow_tau_a + (1 - cs.exp(-self.pole * elapsed)) * (y.tau_a - s.slow_tau_a)
+            return Reading(y._replace(tau_a=slow), slow)
+
+    problem = resolve(world(law={"shaped_inertia": {"ratio": 0.1}}))
+    built_in = resolve(
+        world(law={"shaped_inertia": {"ratio": 0.1}}, sensors={"torque_bandwidth": 100 / (2 * np.pi)})
+    )
+    slow = with_parts(problem, sensors=[Slow(100.0)])
+    assert LinearLoop(problem).radius() < 1
+    assert LinearLoop(slow).radius() == pytest.approx(LinearLoop(built_in).radius(), rel=1e-6)
+    assert LinearLoop(with_parts(problem, sensors=[Slow(1e6)])).radius() == pytest.approx(
+        LinearLoop(problem).radius(), abs=1e-6
+    )
+
+
+class Zigzag(AbstractReferenceEvent):
+    """There and back, along an axis, with the frequency of a tremor."""
+
+    size: float
+    frequency: float
+
+    def build(self, now: Pose) -> Motion:
+        return hold(now) | {
+            "sine": np.array([0, 0, self.size]),
+            "frequency": np.asarray(2 * np.pi * self.frequency),
+        }
+
+    def words(self) -> str:
+        return f"zigzag of {self.size:g} m"
+
+
+@pytest.mark.parametrize("control", ["sampled", "continuous"])
+def test_a_motion_of_ones_own(control: str) -> None:
+    """It begins where the reference is by then, and what the scenario does later goes on from there."""
+    without = {} if control == "sampled" else {"control": None, "tank": None, "noise": None}
+    steps = {"reference": [{"at": at, "kind": "step", "by": [0, 0, 0.01]} for at in (0.1, 0.4)]}
+    scenario = world(duration=0.5, **steps, **without)
+    own = pf.simulate(scenario, reference=[Zigzag(at=0.2, size=0.01, frequency=5.0)])
+    plain, z = pf.simulate(scenario), own["desired_position"][:, 2]
+    before, during, after = own.time < 0.2, (own.time > 0.2) & (own.time < 0.4), own.time > 0.4001
+    np.testing.assert_allclose(z[before], plain["desired_position"][before, 2], atol=1e-12)
+    moved = 0.01 * np.sin(2 * np.pi * 5.0 * (own.time[during] - 0.2))
+    np.testing.assert_allclose(z[during] - plain["desired_position"][during, 2], moved, atol=1e-12)
+    np.testing.assert_allclose(
+        z[after], plain["desired_position"][after, 2] + 0.01 * np.sin(2 * np.pi), atol=1e-9
+    )
+    with pytest.raises(ValueRangeError, match="when no other motion begins"):
+        pf.simulate(scenario, reference=[Zigzag(at=0.4, size=0.01, frequency=5.0)])

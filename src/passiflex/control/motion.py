@@ -121,6 +121,13 @@ def shifted(motion: Motion, start: Pose) -> dict[str, NDArray[np.float64]]:
     return moved
 
 
+def rebased(motion: Motion, old: Pose, new: Pose) -> Motion:
+    """Return a motion that began somewhere seen from `old`, seen from `new`: displacements are in world axes."""
+    begin = pose_at(motion, 0.0)
+    turned = begin.rotation @ old.rotation.T @ new.rotation
+    return shifted(motion, Pose(begin.position + new.position - old.position, turned))
+
+
 def moved(pose: Pose, by: ArrayLike, turn: ArrayLike) -> Pose:
     """Return a pose displaced by `by` (3,) m and turned by a rotation vector (3,) rad, both in world axes."""
     turned = Rotation.from_rotvec(np.asarray(turn, dtype=float)).as_matrix() @ pose.rotation

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 
 from passiflex.errors import NameUnknownError
@@ -18,13 +19,26 @@ FORMATS: dict[str, Callable[[Run, Path], None]] = {
     ".rrd": write_rrd,
 }
 """Ending of a file → what writes it."""
+GROUP = "passiflex.exports"
+"""Entry points of other packages: the name is an ending, as `.mat`, the object what writes a run to a path."""
+
+
+def formats() -> dict[str, Callable[[Run, Path], None]]:
+    """Return what writes each kind of file: ours, and those of other packages that are installed."""
+    others = {e.name: e for e in entry_points(group=GROUP) if e.name not in FORMATS}
+    return FORMATS | {ending: _loaded(e) for ending, e in others.items()}
+
+
+def _loaded(point: EntryPoint) -> Callable[[Run, Path], None]:
+    """Return what an entry point names, imported when a run is written."""
+    return lambda run, path: point.load()(run, path)
 
 
 def export_run(run: Run, path: str | Path) -> Path:
     """Write a run for another program, the whole file or none, and return its path.
 
     `.csv` is a table of all signals over time; `.rrd` a Rerun recording with the moving arm; `.mcap` ROS 2
-    messages, which Foxglove and PlotJuggler open.
+    messages, which Foxglove and PlotJuggler open. Other packages may bring further endings (`GROUP`).
 
     Raises
     ------
@@ -36,9 +50,10 @@ def export_run(run: Run, path: str | Path) -> Path:
         If the file cannot be written.
     """
     path = Path(path)
-    write = FORMATS.get(path.suffix)
+    known = formats()
+    write = known.get(path.suffix)
     if write is None:
-        raise NameUnknownError("ending of an export", path.suffix, FORMATS)
+        raise NameUnknownError("ending of an export", path.suffix, known)
     with whole_file(path) as temporary:
         write(run, temporary)
     return path

@@ -22,6 +22,7 @@ from passiflex.native import (
 )
 from passiflex.robots.arm import SerialArm
 from passiflex.sampled.controller import SampledController
+from passiflex.sampled.sensors import AbstractSensorEffect
 from passiflex.sampled.tanks import TANKS
 
 CVODES_DERIVATIVES = {"fd_method": "forward", "is_diff_in": [True, False, False]}
@@ -95,12 +96,14 @@ def interpreted_sampled_loop(loop: SampledLoop) -> CompiledSampledLoop:
     """Return the same without compiling anything: for a few evaluations of a loop that nobody runs yet."""
     if structure(loop) in _built_sampled:
         return compiled_sampled_loop(loop)
-    return _interpreted(loop.controller, loop.elements)
+    return _interpreted(loop.controller, loop.elements, loop.effects)
 
 
 @lru_cache(maxsize=8)
-def _interpreted(controller: SampledController, elements: Elements) -> CompiledSampledLoop:
-    loop = SampledLoop(controller, elements)
+def _interpreted(
+    controller: SampledController, elements: Elements, effects: tuple[AbstractSensorEffect, ...]
+) -> CompiledSampledLoop:
+    loop = SampledLoop(controller, elements, effects)
     functions = [loop.plant.rhs, loop.control, loop.outputs, loop.period.function]
     held = HeldLoop(loop.plant.rhs, loop.control, None)
     return CompiledSampledLoop(loop, held, *(NativeFunction(f) for f in functions))
@@ -112,7 +115,7 @@ def structure(loop: SampledLoop) -> tuple[object, ...]:
     of_tank = type(tank) if tank is None or type(tank) in TANKS.values() else tank
     return (
         _urdf(law.robot.arm), law.structure, of_tank, controller.external, controller.inner, controller.actions,
-        _structures(loop.elements),
+        _structures(loop.elements), loop.effects,
     )  # fmt: skip
 
 

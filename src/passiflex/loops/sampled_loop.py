@@ -21,7 +21,7 @@ from passiflex.robots.arm import EndEffectorPose
 from passiflex.sampled.controller import SampledController
 from passiflex.sampled.motors import limit_layout, limited
 from passiflex.sampled.rest import Rest
-from passiflex.sampled.sensors import Sensors
+from passiflex.sampled.sensors import AbstractSensorEffect, Sensors
 from passiflex.sampled.signals import ControlParameters, PeriodResult, Setpoint
 
 AT_ONCE = 1e-7
@@ -55,6 +55,8 @@ class SampledLoop:
 
     controller: SampledController
     elements: Elements = ELEMENTS
+    effects: tuple[AbstractSensorEffect, ...] = ()
+    """On the readings, beside those of the sensors' own."""
 
     @cached_property
     def plant(self) -> Plant:
@@ -64,7 +66,7 @@ class SampledLoop:
     @cached_property
     def sensors(self) -> Sensors:
         """Return the sensors."""
-        return Sensors(self.controller.law.robot.n)
+        return Sensors(self.controller.law.robot.n, self.effects)
 
     @cached_property
     def parameters(self) -> Parts:

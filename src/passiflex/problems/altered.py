@@ -11,7 +11,7 @@ import numpy as np
 import yaml
 from numpy.typing import ArrayLike, NDArray
 
-from passiflex.control.motion import Motion, Pose, pose_at, shifted
+from passiflex.control.motion import rebased
 from passiflex.control.posture import posture
 from passiflex.errors import NameUnknownError, ValueRangeError
 from passiflex.problems.problem import Problem, SampledProblem, require_sampled
@@ -180,7 +180,7 @@ def _at_rest(problem: SampledProblem, plant: dict[str, Array]) -> SampledProblem
     shaped = law.posture_at_rest(q, q + stretch, K, gains)
     home = posture(law.robot, shaped, model).pose
     events = (
-        e if e.motion is None else e._replace(motion=_rebased(e.motion, problem.home, home))
+        e if e.motion is None else e._replace(motion=rebased(e.motion, problem.home, home))
         for e in problem.events
     )
     return dataclasses.replace(
@@ -190,13 +190,6 @@ def _at_rest(problem: SampledProblem, plant: dict[str, Array]) -> SampledProblem
         events=tuple(events),
         held=weight,
     )
-
-
-def _rebased(motion: Motion, old: Pose, new: Pose) -> Motion:
-    """Return a motion that began somewhere seen from `old`, seen from `new`: displacements are in world axes."""
-    begin = pose_at(motion, 0.0)
-    turned = begin.rotation @ old.rotation.T @ new.rotation
-    return shifted(motion, Pose(begin.position + new.position - old.position, turned))
 
 
 def _write_timing(data: dict[str, Any], period: float, delay: float, rate: float | None) -> None:

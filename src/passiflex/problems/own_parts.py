@@ -15,8 +15,11 @@ from passiflex.elements import AbstractElement, Effect, Touch
 from passiflex.errors import ArgumentError, ValueRangeError
 from passiflex.loops.plant import Plant
 from passiflex.problems.problem import Problem, SampledProblem
+from passiflex.problems.timeline import with_motions
 from passiflex.robots.flexible import RobotState
+from passiflex.sampled.sensors import AbstractSensorEffect
 from passiflex.sampled.tank import AbstractTank
+from passiflex.scenarios.reference import AbstractReferenceEvent
 
 
 def with_parts(
@@ -26,6 +29,8 @@ def with_parts(
     gains: Mapping[str, ArrayLike] | None = None,
     tank: AbstractTank | None = None,
     elements: Sequence[AbstractElement] = (),
+    sensors: Sequence[AbstractSensorEffect] = (),
+    reference: Sequence[AbstractReferenceEvent] = (),
 ) -> Problem:
     """Return the problem with parts of the caller's own.
 
@@ -35,20 +40,27 @@ def with_parts(
     gains: Of the law, by name, in place of the scenario's or beside them.
     tank: In place of the scenario's, with its settings.
     elements: What touches the robot beside the rest.
+    sensors: What the readings of a sampled run go through, after its own sensors.
+    reference: Motions of the reference, each from its instant on, among those of the scenario.
 
     Raises
     ------
     ValueRangeError
         For another robot's law, or one in a matched loop, an element with inputs or more than one port, two of one
-        name, or a tank in continuous time.
+        name, a tank or sensors in continuous time, or a motion beyond the run.
     ArgumentError
         For what is no such part, as its class.
     NameUnknownError, SizeError
         For gains that the law does not have, or lacks.
     """
-    if not isinstance(elements, Sequence):
-        raise ArgumentError(elements, "a list of elements")
-    kinds = (law, AbstractLaw), (tank, AbstractTank), *((element, AbstractElement) for element in elements)
+    lists = {"elements": elements, "sensor effects": sensors, "motions of the reference": reference}
+    for name, given in lists.items():
+        if not isinstance(given, Sequence):
+            raise ArgumentError(given, f"a list of {name}")
+    kinds: list[tuple[Any, type]] = [(law, AbstractLaw), (tank, AbstractTank)]
+    kinds += [(element, AbstractElement) for element in elements]
+    kinds += [(effect, AbstractSensorEffect) for effect in sensors]
+    kinds += [(event, AbstractReferenceEvent) for event in reference]
     for part, kind in kinds:
         if not isinstance(part, kind | None):
             raise ArgumentError(part, f"an instance of {kind.__name__}, from a class of your own")
@@ -61,7 +73,11 @@ def with_parts(
         changed = _with_tank(changed, tank)
     if elements:
         changed = _with_elements(changed, tuple(elements))
-    own = [part for part in (law, tank, *elements) if part is not None]
+    if sensors:
+        changed = _with_sensors(changed, tuple(sensors))
+    if reference:
+        changed = _with_reference(changed, reference)
+    own = [part for part in (law, tank, *elements, *sensors, *reference) if part is not None]
     if not own:
         return problem
     said = f"# With parts that no scenario has: {', '.join(type(part).__name__ for part in own)}.\n"
@@ -119,6 +135,25 @@ def _with_elements(problem: Problem, elements: tuple[AbstractElement, ...]) -> P
         values["plant"] |= e.numbers(n)
     changed = dataclasses.replace(problem, elements=plant.elements)
     return dataclasses.replace(changed, numbers=changed.parts.pack(values))
+
+
+def _with_sensors(problem: Problem, effects: tuple[AbstractSensorEffect, ...]) -> Problem:
+    if not isinstance(problem, SampledProblem):
+        raise ValueRangeError("sensors of one's own are for sampled loops", needs="a scenario with `control`")
+    changed = dataclasses.replace(problem, effects=(*problem.effects, *effects))
+    _ = changed.loop.memory  # which refuses two fields of one name
+    return changed
+
+
+def _with_reference(problem: Problem, events: Sequence[AbstractReferenceEvent]) -> Problem:
+    """Return the problem with further motions: each begins where the reference is by then."""
+    times = {e.time for e in problem.events if e.motion is not None} - {0.0}
+    for event in events:
+        if not 0 <= event.at < problem.duration or event.at in times:
+            needs = f"from 0 to before the end, {problem.duration:g} s, when no other motion begins"
+            raise ValueRangeError("a motion of the reference", got=f"at {event.at:g} s", needs=needs)
+        times.add(event.at)
+    return dataclasses.replace(problem, events=with_motions(problem.events, events))
 
 
 def _effect(element: AbstractElement, n: int) -> Effect:

@@ -20,6 +20,7 @@ from passiflex.loops.plant import Elements
 from passiflex.loops.sampled_loop import SampledLoop
 from passiflex.parts import Parts
 from passiflex.sampled.controller import SampledController
+from passiflex.sampled.sensors import AbstractSensorEffect
 
 Array = NDArray[np.float64]
 NOTHING: Mapping[str, float] = MappingProxyType({})
@@ -145,6 +146,7 @@ class SampledProblem(Problem):
     held: Motor torque at the start (n,).
     gain_changes: Of K_x and D_x, in the order of time.
     feedforward: Wrenches (6,) that the end effector is to exert.
+    effects: On the readings, beside those of the sensors' own.
     """
 
     controller: SampledController
@@ -156,11 +158,12 @@ class SampledProblem(Problem):
     held: Array
     gain_changes: tuple[GainChange, ...]
     feedforward: tuple[Lasting, ...]
+    effects: tuple[AbstractSensorEffect, ...] = ()
 
     @cached_property
     def loop(self) -> SampledLoop:
         """Return the loop that runs."""
-        return SampledLoop(self.controller, self.elements)
+        return SampledLoop(self.controller, self.elements, self.effects)
 
     @property
     def parts(self) -> Parts:

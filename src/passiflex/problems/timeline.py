@@ -8,8 +8,9 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
-from passiflex.control.motion import Motion, Pose, hold, pose_at
+from passiflex.control.motion import Motion, Pose, hold, pose_at, rebased
 from passiflex.problems.problem import Event
+from passiflex.scenarios.reference import AbstractReferenceEvent
 from passiflex.scenarios.scenario import Scenario
 
 Array = NDArray[np.float64]
@@ -40,6 +41,27 @@ def _motions(scenario: Scenario, home: Pose) -> dict[float, Motion]:
         motions[event.at] = event.build(now)
         began = event.at
     return motions
+
+
+def with_motions(events: tuple[Event, ...], own: Sequence[AbstractReferenceEvent]) -> tuple[Event, ...]:
+    """Return the events with further motions, from where the reference is by then; later ones go along with them."""
+    first = events[0].motion
+    assert first is not None
+    old, old_began, new, new_began = first, 0.0, first, 0.0
+    found: list[Event] = []
+    times = {e.time: e for e in events}
+    added = {event.at: event for event in own}
+    for time in sorted({*times, *added}):
+        was, now = pose_at(old, time - old_began), pose_at(new, time - new_began)
+        event = times.get(time) or found[-1]._replace(time=time, motion=None)
+        if event.motion is not None and time > 0:
+            old, old_began, new, new_began = event.motion, time, rebased(event.motion, was, now), time
+            event = event._replace(motion=new)
+        if time in added:
+            new, new_began = added[time].build(now), time
+            event = event._replace(motion=new)
+        found.append(event)
+    return tuple(found)
 
 
 def _summed(lasting: Sequence[tuple[float, float, tuple[float, ...]]]) -> dict[float, Array]:

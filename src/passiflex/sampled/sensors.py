@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import abc
 from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import NamedTuple
@@ -41,9 +42,34 @@ class Reading(NamedTuple):
     state: cs.SX
 
 
+class AbstractSensorEffect(abc.ABC):
+    """What else the readings go through, in their order, as a dead zone or a bias that drifts.
+
+    Its numbers are attributes of its own. What the books of a tank know of the sensors' errors they do not know of it.
+    """
+
+    def state(self, n: int) -> Layout:
+        """Return what is remembered from one sample to the next.
+
+        A field that depends on the readings and acts on the command says so (`acts`), or the judge of stability does
+        not see it; one that goes its own way, as a drift, does not.
+        """
+        return Layout(())
+
+    def start(self, at: Rest) -> Remembered:
+        """Return what is remembered at rest; zeros for most."""
+        return self.state(at.q.size).zeros()
+
+    @abc.abstractmethod
+    def read(self, y: Measurement, elapsed: cs.SX, s: SimpleNamespace) -> Reading:
+        """Return the reading of y, `elapsed` seconds after the last one."""
+
+
 @dataclass(frozen=True)
 class Sensors:
     """The sensors of one robot, in this order: scale, offset, noise, bandwidth, resolution; velocities come last.
+
+    Then `effects` of somebody's own.
 
     All numbers are parameters: 0 switches a scale error, an offset or a resolution off, `UNFILTERED` a
     bandwidth, and `velocity_differences` 0 gives the true velocities. Scale and offset stay what they are
@@ -51,6 +77,7 @@ class Sensors:
     """
 
     n: int
+    effects: tuple[AbstractSensorEffect, ...] = ()
 
     @property
     def layout(self) -> Layout:
@@ -73,7 +100,11 @@ class Sensors:
 
     @property
     def state(self) -> Layout:
-        """Return what the sensors remember from one sample to the next."""
+        """Return what is remembered from one sample to the next."""
+        return sum((effect.state(self.n) for effect in self.effects), self._own)
+
+    @property
+    def _own(self) -> Layout:
         n = self.n
         return Layout(
             (
@@ -89,12 +120,13 @@ class Sensors:
 
     def start(self, at: Rest) -> Remembered:
         """Return what they remember at rest."""
-        return self.state.zeros() | {
+        own = self._own.zeros() | {
             "started": at.running,
             "read_q": at.running * at.q,
             "read_theta": at.running * at.theta,
             "read_tau_a": at.running * at.tau_a,
         }
+        return own | {k: v for e in self.effects for k, v in e.start(at).items()}
 
     def read(
         self, truth: Measurement, torque_noise: cs.SX, elapsed: cs.SX, s: SimpleNamespace, g: SimpleNamespace
@@ -114,7 +146,7 @@ class Sensors:
 
         dq, smooth_dq = velocity(truth.dq, q, s.read_q, s.read_dq)
         dtheta, smooth_dtheta = velocity(truth.dtheta, theta, s.read_theta, s.read_dtheta)
-        state = self.state.stack(
+        state = self._own.stack(
             {
                 "started": 1,
                 "read_q": q,
@@ -125,4 +157,8 @@ class Sensors:
                 "read_wrench": F_e,
             }
         )
-        return Reading(Measurement(q, theta, dq, dtheta, tau_a, F_e, truth.tau_e), state)
+        y = Measurement(q, theta, dq, dtheta, tau_a, F_e, truth.tau_e)
+        for effect in self.effects:
+            y, own = effect.read(y, elapsed, s)
+            state = cs.vertcat(state, own)
+        return Reading(y, state)

@@ -13,7 +13,9 @@ from passiflex.elements import AbstractElement
 from passiflex.problems.own_parts import with_parts
 from passiflex.problems.resolution import resolve
 from passiflex.runs.run import Run
+from passiflex.sampled.sensors import AbstractSensorEffect
 from passiflex.sampled.tank import AbstractTank
+from passiflex.scenarios.reference import AbstractReferenceEvent
 from passiflex.scenarios.scenario import Scenario
 from passiflex.scenarios.scenario_file import as_scenario
 from passiflex.simulation.through_time import simulate_problem
@@ -26,6 +28,8 @@ def simulate(
     gains: Mapping[str, ArrayLike] | None = None,
     tank: AbstractTank | None = None,
     elements: Sequence[AbstractElement] = (),
+    sensors: Sequence[AbstractSensorEffect] = (),
+    reference: Sequence[AbstractReferenceEvent] = (),
 ) -> Run:
     """Return the run of a scenario, of a mapping with the entries of a scenario file, or of the file at a path.
 
@@ -33,7 +37,7 @@ def simulate(
 
     Parameters
     ----------
-    law, gains, tank, elements: Parts of your own, as `problems.own_parts.with_parts` takes them.
+    law, gains, tank, elements, sensors, reference: Parts of your own, as `problems.own_parts.with_parts` takes them.
 
     Raises
     ------
@@ -41,4 +45,7 @@ def simulate(
         If the scenario has mistakes or does not fit its robot, or parts do not fit the scenario.
     """
     problem = resolve(as_scenario(scenario))
-    return simulate_problem(with_parts(problem, law=law, gains=gains, tank=tank, elements=elements))
+    own = with_parts(
+        problem, law=law, gains=gains, tank=tank, elements=elements, sensors=sensors, reference=reference
+    )
+    return simulate_problem(own)
