@@ -26,9 +26,9 @@ from multiply_add import core_rates
 from other_ways import alternatives
 from passiflex.campaigns import draws, parse_campaign, sample_scenario
 from passiflex.campaigns.evaluate import evaluate_samples
-from passiflex.campaigns.measures import SIGNALS, measures
 from passiflex.chunks.engines import LocalProcesses
-from passiflex.responses.steps import step_window
+from passiflex.metrics.measures import SIGNALS, measures
+from passiflex.metrics.steps import step_window
 from passiflex.simulation import Problem, resolve, simulate_problem
 from passiflex.simulation.batch import lane_loop, simulate_batch
 from passiflex.studies.paper import shipped_scenario

@@ -14,7 +14,7 @@ from rich.table import Table
 from core_time import best_times
 from lane_limit import period_of
 from mujoco_way import MujocoPlant
-from passiflex.campaigns.measures import SIGNALS
+from passiflex.metrics.measures import SIGNALS
 from passiflex.simulation import simulate_problem
 from passiflex.simulation.batch import lane_loop, simulate_batch
 from sampled_law import HeldPlant, SampledLaw, comparable, orders, through_samples

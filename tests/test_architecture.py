@@ -26,7 +26,7 @@ ROOMS = (
     "runs",
     "simulation",
     "passivity",
-    "responses",
+    "metrics",
     "limits",
     "chunks",
     "campaigns",

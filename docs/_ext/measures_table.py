@@ -6,7 +6,7 @@ from docutils import nodes
 from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
-from passiflex.campaigns.measures import MEASURES
+from passiflex.metrics.measures import MEASURES
 
 COLUMNS = (("measure", 24), ("unit", 8), ("bad end", 10), ("meaning", 58))
 

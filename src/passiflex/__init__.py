@@ -6,7 +6,7 @@
     print(pf.audit(run).verdict)
 
 The rooms, in the order in which they may import each other: `texts`, `robots`, `phs`, `control`, `sampled`, `elements`,
-`native`; `scenarios`, `loops`, `problems`, `stability`, `runs`, `simulation`; `passivity`, `responses`, `limits`,
+`native`; `scenarios`, `loops`, `problems`, `stability`, `runs`, `simulation`; `passivity`, `metrics`, `limits`,
 `chunks`, `campaigns`; then what looks at their results: `diagrams`, `plotting`, `reports`, `exports`; then `studies`,
 `cli`.
 """

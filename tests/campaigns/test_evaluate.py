@@ -32,9 +32,9 @@ from passiflex.campaigns.evaluate import (
     require_response,
     run_sample,
 )
-from passiflex.campaigns.measures import MEASURES, measures
 from passiflex.errors import NameUnknownError, ValueRangeError
-from passiflex.responses.steps import step_window
+from passiflex.metrics.measures import MEASURES, measures
+from passiflex.metrics.steps import step_window
 from passiflex.simulation import resolve
 from worlds import merged
 

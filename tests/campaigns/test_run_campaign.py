@@ -35,7 +35,6 @@ from passiflex.campaigns import (
     sample_scenario,
 )
 from passiflex.campaigns.evaluate import evaluate_samples
-from passiflex.campaigns.measures import measures
 from passiflex.campaigns.run_campaign import worst
 from passiflex.chunks.manifest import FolderError
 from passiflex.chunks.run_chunks import Progress
@@ -49,7 +48,8 @@ from passiflex.errors import (
     ValueRangeError,
 )
 from passiflex.files import OutputError
-from passiflex.responses.steps import step_window
+from passiflex.metrics.measures import measures
+from passiflex.metrics.steps import step_window
 from passiflex.simulation import Run, batch, resolve
 from worlds import merged
 

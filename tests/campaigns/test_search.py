@@ -17,11 +17,11 @@ from passiflex.campaigns import search as room
 from passiflex.campaigns.box import EDGE, Box
 from passiflex.campaigns.evaluate import evaluate_problems
 from passiflex.campaigns.found import Found, require_place
-from passiflex.campaigns.measures import MEASURES
 from passiflex.campaigns.search import DISTINCT, search
 from passiflex.cli.campaign_tables import found_table
 from passiflex.errors import NameUnknownError, ValueRangeError
 from passiflex.files import OutputError
+from passiflex.metrics.measures import MEASURES
 from passiflex.scenarios.scenario import Scenario
 from passiflex.simulation import load_scenario, resolve, simulate
 from worlds import merged

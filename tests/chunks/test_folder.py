@@ -234,7 +234,7 @@ def test_a_manifest_of_before_is_read(tmp_path: Path) -> None:
         ("exports/csv_file.py", False), ("plotting/run.py", False), ("cli/commands.py", False),
         ("problems/resolution.py", True), ("loops/plant.py", True), ("robots/data/iiwa14.urdf", True),
         ("native/lanes.h", True),
-        ("campaigns/measures.py", True), ("passivity/audit.py", True), ("chunks/tables.py", True),
+        ("metrics/measures.py", True), ("passivity/audit.py", True), ("chunks/tables.py", True),
     ],
 )  # fmt: skip
 def test_rows_are_of_the_source_that_makes_numbers(

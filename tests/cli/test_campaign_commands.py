@@ -14,10 +14,10 @@ import passiflex
 from campaigns.small_campaigns import SAMPLED, UNSTABLE, campaign
 from cli.shell import Result, Shell
 from passiflex.campaigns import Results, sample_scenario
-from passiflex.campaigns.measures import measures
 from passiflex.chunks.run_chunks import Progress
 from passiflex.cli import campaign_commands, terminal
-from passiflex.responses.steps import step_window
+from passiflex.metrics.measures import measures
+from passiflex.metrics.steps import step_window
 from passiflex.simulation import Run, resolve
 from worlds import merged
 

@@ -113,7 +113,7 @@ def made_up(count: int = 40, joints: int = 7, **changes: Any) -> Run:
     signals["torque_limit"] = ("joint", np.linspace(1, 3, joints), {"units": "N m"})
     attributes = {
         "name": "made up", "law": "ImpedanceLaw", "has_tank": 1, "control_period": 0.001, "failure": "",
-        "events": json.dumps([]), "configuration": "",
+        "events": json.dumps([]), "scenario": "",
     }  # fmt: skip
     for name, value in changes.items():
         if name in signals:

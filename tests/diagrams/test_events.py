@@ -26,7 +26,7 @@ POSE = PUSHED["law"] | {
 
 def configured(**changes: object) -> Run:
     scenario = PUSHED | {"law": POSE, "reference": [], "forces": []} | changes
-    return altered(continuous(), configuration=yaml.safe_dump(scenario))
+    return altered(continuous(), scenario=yaml.safe_dump(scenario))
 
 
 def test_every_kind_of_reference_is_told() -> None:
@@ -72,8 +72,8 @@ def test_what_was_to_come_after_an_early_end_did_not_happen() -> None:
 
 @pytest.mark.parametrize("text", ["", "name: [", "robot: iiwa14", "<b>no scenario</b>"])
 def test_a_configuration_that_cannot_be_read_tells_nothing(text: str) -> None:
-    assert marks_of(made_up(configuration=text)) == ()
-    assert spans_of(made_up(configuration=text)) == ()
+    assert marks_of(made_up(scenario=text)) == ()
+    assert spans_of(made_up(scenario=text)) == ()
 
 
 def test_the_governor_is_shown_from_the_first_row_that_is_held_back_to_the_row_after_the_last() -> None:
@@ -131,7 +131,7 @@ def test_a_stiffness_that_nobody_changes_is_not_held_back() -> None:
     scenario = PUSHED | {"law": POSE, "reference": [], "forces": [], "control": CONTROL}
     change = {"at": 0.1, "duration": 0.1, "stiffness": {"translation": 80, "rotation": 80}}
     for gains, label in (([], "reference held back"), ([change], "reference and stiffness held back")):
-        known = altered(run, configuration=yaml.safe_dump(scenario | {"gains": gains}))
+        known = altered(run, scenario=yaml.safe_dump(scenario | {"gains": gains}))
         assert [s.label for s in spans_of(known) if s.kind == "governor"] == [label]
 
 

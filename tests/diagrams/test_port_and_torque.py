@@ -175,7 +175,7 @@ def test_where_some_joints_slide_each_has_its_own_unit() -> None:
         ("N m", "torque, joint 2"),
         ("N m", "torque, joint 3"),
     ]
-    unknown = altered(run, robot_description="", configuration="")
+    unknown = altered(run, robot_description="", scenario="")
     assert shown("torque", unknown)["joint 1"].unit == "N m or N"
 
 

@@ -22,10 +22,10 @@ from diagrams.seen import (
     simulated,
     without,
 )
-from passiflex.campaigns.measures import _ideal
 from passiflex.control.gain_design import target_inertia
 from passiflex.diagrams import Panel, Viewed, ideal_motion, panels, roles_of, viewed
 from passiflex.diagrams.tracking import orientation_error
+from passiflex.metrics.measures import _ideal
 from passiflex.simulation import Run, parse_scenario, resolve
 
 
@@ -182,21 +182,21 @@ def test_the_ideal_of_one_axis_is_the_closed_form() -> None:
 )
 def test_there_is_no_ideal_where_something_acts_that_it_does_not_know(changes: dict[str, object]) -> None:
     scenario = PUSHED | {"control": CONTROL} | changes
-    run = altered(continuous(), configuration=yaml.safe_dump(scenario))
+    run = altered(continuous(), scenario=yaml.safe_dump(scenario))
     assert ideal_motion(run) is None
-    known = altered(continuous(), configuration=yaml.safe_dump(PUSHED | {"control": CONTROL}))
+    known = altered(continuous(), scenario=yaml.safe_dump(PUSHED | {"control": CONTROL}))
     assert ideal_motion(known) is not None
 
 
 def test_there_is_no_ideal_without_configuration_or_without_the_robot_that_it_needs() -> None:
     assert ideal_motion(made_up()) is None
     nameless = altered(continuous())
-    del nameless.data.attrs["configuration"]
+    del nameless.data.attrs["scenario"]
     assert ideal_motion(nameless) is None
     elsewhere = PUSHED | {"robot": "gone.yaml"}
-    assert ideal_motion(altered(continuous(), configuration=yaml.safe_dump(elsewhere))) is not None
+    assert ideal_motion(altered(continuous(), scenario=yaml.safe_dump(elsewhere))) is not None
     ratio = elsewhere | {"law": PUSHED["law"] | {"damping": {"ratio": 0.7}}}
-    assert ideal_motion(altered(continuous(), configuration=yaml.safe_dump(ratio))) is not None
-    older = altered(continuous(), configuration=yaml.safe_dump(ratio))
+    assert ideal_motion(altered(continuous(), scenario=yaml.safe_dump(ratio))) is not None
+    older = altered(continuous(), scenario=yaml.safe_dump(ratio))
     del older.data.attrs["joint_parameters"]
     assert ideal_motion(older) is None

@@ -31,5 +31,5 @@ def damaged(run: Run) -> Run:
     data["q"][10:13, 1] = np.nan
     data["position"][20:25] = np.nan
     data["tau_m"][0, 0] = np.inf
-    data.attrs |= {"robot_description": "", "robot": "somebody's <b>arm</b>", "configuration": ""}
+    data.attrs |= {"robot_description": "", "robot": "somebody's <b>arm</b>", "scenario": ""}
     return Run(data)

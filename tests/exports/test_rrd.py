@@ -168,7 +168,7 @@ def test_the_recording_says_what_was_run(run: Run, path: Path, columns: Columns)
     assert properties["robot"] == [["planar2r"]]
     assert properties["verdict"] == [[audit(run).verdict]]
     (text,) = columns["/configuration"]["TextDocument:text"][0]
-    assert text == run.data.attrs["configuration"]
+    assert text == run.data.attrs["scenario"]
     ((urdf,),) = columns["/robot_description"]["TextDocument:text"]
     assert urdf == with_solids(chain_of(run) or pytest.fail("no arm"))
     told = [text for (text,) in columns["/events"]["TextLog:text"]]

@@ -109,9 +109,9 @@ def test_events_are_lines_named_above_the_first_row_unless_a_shade_says_the_same
 
 def test_names_of_events_that_would_overlap_stand_above_each_other() -> None:
     steps = "".join(f"- {{at: {0.5 + i / 1000}, kind: step, by: [0, 0, 0.1]}}\n" for i in range(5))
-    text = continuous().data.attrs["configuration"]
+    text = continuous().data.attrs["scenario"]
     start, end = text.index("reference:"), text.index("forces:")
-    run = altered(continuous(), configuration=text[:start] + "reference:\n" + steps + text[end:])
+    run = altered(continuous(), scenario=text[:start] + "reference:\n" + steps + text[end:])
     first = used(draw_run("energy", Viewed(run, "it")))[0]
     named = [t for t in first.texts if t.get_text() == "step 0.1 m"]
     assert len(named) == ROWS_OF_EVENTS

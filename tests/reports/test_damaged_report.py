@@ -23,9 +23,9 @@ DAMAGE = {
     "no torques": lambda: changed(continuous(), without=("tau_m", "torque_limit")),
     "all NaN": lambda: with_nan(continuous(), "position", slice(None)),
     "NaN at the start": lambda: with_nan(sampled(), "tank_energy", slice(0, 5)),
-    "no configuration": lambda: changed(sampled(), configuration=""),
+    "no configuration": lambda: changed(sampled(), scenario=""),
     "no arm": lambda: changed(
-        continuous(), robot_description="<robot/>", configuration=PLANAR.replace("planar2r", "nobody")
+        continuous(), robot_description="<robot/>", scenario=PLANAR.replace("planar2r", "nobody")
     ),
     "infinite": lambda: Run(continuous().data.assign(tau_m=continuous().data["tau_m"] * np.inf)),
 }
@@ -74,7 +74,7 @@ def test_a_run_of_before_has_the_arm_of_the_catalogue() -> None:
     data = continuous().data.copy()
     del data.attrs["robot_description"]
     assert page(Run(data)).header["arm"] == page(continuous()).header["arm"]
-    lost = Run(data.assign_attrs(configuration=data.attrs["configuration"].replace("planar2r", "nobody")))
+    lost = Run(data.assign_attrs(scenario=data.attrs["scenario"].replace("planar2r", "nobody")))
     header = page(lost).header
     assert header["arm"] is None
     assert header["verdict"]["verdict"] == audit(lost).verdict

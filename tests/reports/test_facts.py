@@ -104,7 +104,7 @@ def test_the_rigid_law_has_an_inertia_and_no_tank() -> None:
 def baseline_scenario():
     from passiflex.simulation import parse_scenario
 
-    return parse_scenario(baseline().data.attrs["configuration"])
+    return parse_scenario(baseline().data.attrs["scenario"])
 
 
 @pytest.mark.parametrize(
@@ -147,23 +147,23 @@ def test_who_made_it() -> None:
 )
 def test_a_robot_file_is_shown_by_its_name(path: str) -> None:
     text = f"name: a\nrobot: {path}\nduration: 1.0\n"
-    assert shown_configuration(changed(sampled(), configuration=text)) == text.replace(path, "arm.yaml")
+    assert shown_configuration(changed(sampled(), scenario=text)) == text.replace(path, "arm.yaml")
 
 
 @pytest.mark.parametrize("name", ["arm.yaml", "my arm: #1.yaml"])
 def test_a_robot_file_in_quotes_and_over_lines_is_shown_by_its_name(name: str) -> None:
     said = {"name": "a", "robot": f"/home/me/{'a b ' * 40}#x/{name}", "forces": [{"robot": "/not/this"}]}
-    text = shown_configuration(changed(sampled(), configuration=yaml.safe_dump(said)))
+    text = shown_configuration(changed(sampled(), scenario=yaml.safe_dump(said)))
     assert yaml.safe_load(text) == said | {"robot": name}
 
 
 @pytest.mark.parametrize("text", ["", "- 1\n", "robot: {a: 1}\n", "name: a\n"])
 def test_a_configuration_without_a_robot_file_is_shown_as_it_is(text: str) -> None:
-    assert shown_configuration(changed(sampled(), configuration=text)) == text
+    assert shown_configuration(changed(sampled(), scenario=text)) == text
 
 
 def test_of_a_configuration_that_is_no_yaml_no_path_is_shown() -> None:
-    text = shown_configuration(changed(sampled(), configuration="robot: '/home/me/arm.yaml\nlaw: [1"))
+    text = shown_configuration(changed(sampled(), scenario="robot: '/home/me/arm.yaml\nlaw: [1"))
     assert text == "robot: 'arm.yaml\nlaw: [1"
 
 
@@ -173,4 +173,4 @@ def test_of_a_configuration_that_is_no_yaml_no_path_is_shown() -> None:
 )
 def test_a_configuration_of_any_kind_is_shown_without_being_waited_for(text: str) -> None:
     """Some took a time that grew as the square of their length."""
-    assert shown_configuration(changed(sampled(), configuration=text)) == text
+    assert shown_configuration(changed(sampled(), scenario=text)) == text

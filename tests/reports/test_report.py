@@ -235,8 +235,8 @@ def test_the_same_run_gives_the_same_bytes() -> None:
 
 
 def test_nothing_of_this_machine_is_in_it() -> None:
-    text = str(continuous().data.attrs["configuration"]).replace("planar2r", "/home/somebody/arm.yaml")
-    written = report_text(changed(continuous(), configuration=text))
+    text = str(continuous().data.attrs["scenario"]).replace("planar2r", "/home/somebody/arm.yaml")
+    written = report_text(changed(continuous(), scenario=text))
     assert "somebody" not in written
     assert "robot: arm.yaml" in Page.of(written).header["configuration"]
     assert str(Path.home()) not in report_text(continuous())
@@ -256,7 +256,7 @@ def test_text_of_a_run_is_text_everywhere() -> None:
         name=HOSTILE,
         robot=HOSTILE,
         failure=HOSTILE,
-        configuration=HOSTILE,
+        scenario=HOSTILE,
         version=HOSTILE,
         commit=HOSTILE,
         seed=HOSTILE,

@@ -132,7 +132,7 @@ def test_a_law_of_ones_own_has_gains_of_its_own(control: str) -> None:
     slow = pf.simulate(scenario, law=braked(), gains={"brake": 20.0})
     assert np.abs(slow["dphi"]).max() < 0.9 * np.abs(plain["dphi"]).max()
     assert slow.data.attrs["law"] == "Braked"
-    assert slow.data.attrs["configuration"].startswith("# With parts that no scenario has: Braked.\n")
+    assert slow.data.attrs["scenario"].startswith("# With parts that no scenario has: Braked.\n")
     assert pf.Run(slow.data).name == scenario.name
 
 

@@ -22,7 +22,7 @@ from passiflex.passivity import audit
 from passiflex.robots.arm import SerialArm
 from passiflex.robots.chain import SerialChain
 from passiflex.runs.run_file import FORMAT
-from passiflex.simulation import Run, Scenario, parse_scenario, simulate
+from passiflex.simulation import Run, Scenario, parse_scenario, salvage, simulate
 from worlds import planar_text
 
 PLANAR = planar_text(reference=[{"at": 0.2, "kind": "step", "by": [0, 0, 0.05]}], duration=1)
@@ -136,13 +136,13 @@ def test_the_file_is_plain_netcdf(tmp_path: Path) -> None:
 def test_the_stored_configuration_gives_the_same_run_again(tmp_path: Path, changes: dict[str, Any]) -> None:
     """Bit for bit, also from the file."""
     first = Run.load(simulate(planar(**changes)).save(tmp_path / "run.nc"))
-    second = simulate(parse_scenario(first.data.attrs["configuration"]))
+    second = simulate(parse_scenario(first.data.attrs["scenario"]))
     xr.testing.assert_identical(second.data, first.data)
 
 
 def test_the_stored_configuration_is_complete() -> None:
     """Defaults are written out, and everything is in SI units."""
-    configuration = yaml.safe_load(planar_run().data.attrs["configuration"])
+    configuration = yaml.safe_load(planar_run().data.attrs["scenario"])
     assert set(configuration) == set(Scenario.model_fields) - {
         "noise",
         "control",
@@ -335,3 +335,23 @@ def test_an_event_off_the_grid_of_the_noise() -> None:
         simulate(planar(noise=NOISE, reference=step))
     expected = "time 0.2055 s does not fall on the noise's grid; needs a multiple of its hold, 0.01 s"
     assert str(error.value) == expected
+
+
+def test_a_file_of_before_has_its_scenario_by_another_name(tmp_path: Path) -> None:
+    """It loads, is judged and salvaged as a new one."""
+    run = planar_run()
+    data = run.data.copy()
+    data.attrs = {{"scenario": "configuration"}.get(name, name): value for name, value in data.attrs.items()}
+    path = Run(data).save(tmp_path / "old.nc")
+    for read in (Run.load(path), salvage(path).run):
+        assert "configuration" not in read.data.attrs
+        assert read.data.attrs["scenario"] == run.data.attrs["scenario"]
+        assert read.scenario == run.scenario is not None
+        assert audit(read).verdict == audit(run).verdict
+    assert salvage(path).notices == ()
+
+
+def test_a_run_without_a_scenario_that_can_be_read_has_none() -> None:
+    run = planar_run()
+    for text in ("", "law: [", "name: 3"):
+        assert Run(run.data.assign_attrs(scenario=text)).scenario is None

@@ -48,7 +48,7 @@ def test_a_description_of_another_arm_is_not_believed() -> None:
     assert own is not None
     for name in ("planar2r", "iiwa14"):
         other = read_description(name).chain.to_urdf()
-        assert chain_of(changed(robot_description=other, configuration="")) is None
+        assert chain_of(changed(robot_description=other, scenario="")) is None
         believed = chain_of(changed(robot_description=other))  # the configuration has the tool
         assert believed is not None
         np.testing.assert_allclose(believed.tip_xyz, own.tip_xyz, atol=1e-15)
@@ -57,19 +57,19 @@ def test_a_description_of_another_arm_is_not_believed() -> None:
 @pytest.mark.parametrize(
     "attributes",
     [
-        {"configuration": "robot: somebody's"},
-        {"configuration": "robot: ../../etc/robot.yaml"},
-        {"configuration": "robot: iiwa14"},
-        {"configuration": "tool: {position: here}"},
-        {"configuration": "{"},
-        {"configuration": "a text"},
-        {"configuration": "robot: /dev/zero"},
-        {"configuration": 'robot: "/a\\0b.yaml"'},
-        {"configuration": "[" * 5000},
-        {"configuration": "robot: 2001-99-99"},
-        {"configuration": "robot: " + "9" * 5000},
+        {"scenario": "robot: somebody's"},
+        {"scenario": "robot: ../../etc/robot.yaml"},
+        {"scenario": "robot: iiwa14"},
+        {"scenario": "tool: {position: here}"},
+        {"scenario": "{"},
+        {"scenario": "a text"},
+        {"scenario": "robot: /dev/zero"},
+        {"scenario": 'robot: "/a\\0b.yaml"'},
+        {"scenario": "[" * 5000},
+        {"scenario": "robot: 2001-99-99"},
+        {"scenario": "robot: " + "9" * 5000},
         {
-            "configuration": "a: &a [1]\n"
+            "scenario": "a: &a [1]\n"
             + "".join(f"b{i}: &b{i} [{', '.join([f'*b{i - 1}' if i else '*a'] * 9)}]\n" for i in range(9))
         },
     ],

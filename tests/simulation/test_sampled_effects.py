@@ -244,7 +244,7 @@ def test_the_same_seed_gives_the_same_run_and_so_does_its_file(tmp_path: Path) -
     run = effect(*ALL)
     loaded = Run.load(run.save(tmp_path / "run.nc"))
     assert same(loaded, run)
-    configuration = loaded.data.attrs["configuration"]
+    configuration = loaded.data.attrs["scenario"]
     assert same(simulate(parse_scenario(configuration)), run)
     reordered = yaml.safe_dump(yaml.safe_load(configuration))
     assert reordered != configuration

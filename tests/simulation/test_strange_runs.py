@@ -167,7 +167,7 @@ def test_groups_are_left_alone(path: Path) -> None:
         ("name", 3, "name: input should be a valid string; got "),
         ("name", "x" * 2000, "name: string should have at most 1000 characters; got "),
         ("duration", np.inf, "duration: input should be a finite number; got "),
-        ("configuration", np.arange(3), "configuration: input should be a valid string; got "),
+        ("scenario", np.arange(3), "scenario: input should be a valid string; got "),
         ("robot", [1.0, 2.0], "robot: input should be a valid string; got "),
         ("joint_parameters", "[]", "joint_parameters: value error, expected a mapping as JSON"),
     ],
@@ -220,7 +220,7 @@ ALIASES = "a: &a [x,x,x,x,x,x,x,x,x]\n" + "".join(
 )  # fmt: skip
 def test_a_configuration_of_any_kind_is_shown_without_an_arm(configuration: str) -> None:
     data = made().data.copy()
-    data.attrs |= {"robot_description": "", "configuration": configuration}
+    data.attrs |= {"robot_description": "", "scenario": configuration}
     assert chain_of(Run(data)) is None
     assert "/dev" not in shown_configuration(Run(data))
     assert (marks_of(Run(data)), ideal_motion(Run(data))) == ((), None)
@@ -235,7 +235,7 @@ def test_a_configuration_of_any_kind_is_shown_without_an_arm(configuration: str)
 )  # fmt: skip
 def test_a_description_of_any_kind_is_shown_without_an_arm(description: str) -> None:
     data = made().data.copy()
-    data.attrs |= {"robot_description": description, "configuration": ""}
+    data.attrs |= {"robot_description": description, "scenario": ""}
     assert chain_of(Run(data)) is None
 
 

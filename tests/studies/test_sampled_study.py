@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from passiflex.errors import UnstableLoopError
+from passiflex.metrics.steps import displacement, step_window
 from passiflex.origin import package_version, source_commit
 from passiflex.passivity import audit
 from passiflex.plotting.sampled import SampledPanel, draw_sampled
-from passiflex.responses.steps import displacement, step_window
 from passiflex.simulation import Run, Scenario, resolve, simulate, simulate_problem
 from passiflex.studies import external_torque, sampled, shipped_scenario
 from passiflex.studies.paper import ideals

@@ -9,9 +9,9 @@ import yaml
 from pydantic import Field, ValidationInfo, ValidatorFunctionWrapHandler, field_validator, model_validator
 
 from passiflex.campaigns.distributions import Distribution
-from passiflex.campaigns.measures import MEASURES
 from passiflex.campaigns.parameters import checked
 from passiflex.campaigns.target import Target, complete_data, locate
+from passiflex.metrics.measures import MEASURES
 from passiflex.scenarios.control_settings import Seconds
 from passiflex.scenarios.scenario import Scenario
 from passiflex.texts.model_mistakes import word

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from passiflex.campaigns.campaign import Campaign
 from passiflex.campaigns.campaign_file import parse_campaign
 from passiflex.campaigns.draws import columns, draws, words
-from passiflex.campaigns.measures import MEASURES, SIGNALS, measures
 from passiflex.campaigns.same_robot import require_same_robot
 from passiflex.campaigns.samples import sample_scenario
 from passiflex.chunks.engines import usable_cores
@@ -28,9 +27,10 @@ from passiflex.errors import (
     ValueRangeError,
 )
 from passiflex.files import as_path
+from passiflex.metrics.measures import MEASURES, SIGNALS, measures
+from passiflex.metrics.steps import displacement, step_window
 from passiflex.passivity.ledger import Signals
 from passiflex.problems.problem import Problem, SampledProblem
-from passiflex.responses.steps import displacement, step_window
 from passiflex.simulation import Run, Scenario, resolve, simulate_problem
 from passiflex.simulation.batch import digest_batch, simulate_in_lane
 

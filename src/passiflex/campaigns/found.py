@@ -10,10 +10,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from passiflex.campaigns.measures import MEASURES
 from passiflex.campaigns.samples import Values
 from passiflex.errors import UnstableLoopError
 from passiflex.files import OutputError, read_json, read_regular, require_writable, whole_file
+from passiflex.metrics.measures import MEASURES
 from passiflex.origin import package_version, source_commit
 from passiflex.problems.problem import Problem, SampledProblem
 from passiflex.scenarios.scenario import Scenario

@@ -15,11 +15,11 @@ from passiflex.campaigns.campaign import Campaign
 from passiflex.campaigns.evaluate import REFUSED
 from passiflex.campaigns.importance import Association, Index
 from passiflex.campaigns.intervals import Share
-from passiflex.campaigns.measures import IDEAL_RATIO, MEASURES
 from passiflex.campaigns.statistics import Statistics, drawn_columns, numbers_of
 from passiflex.control.gain_design import target_inertia
-from passiflex.responses.closed_form import ideal_displacement
-from passiflex.responses.steps import step_window
+from passiflex.metrics.closed_form import ideal_displacement
+from passiflex.metrics.measures import IDEAL_RATIO, MEASURES
+from passiflex.metrics.steps import step_window
 from passiflex.simulation import resolve
 
 Array = NDArray[np.float64]

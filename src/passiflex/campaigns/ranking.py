@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 
-from passiflex.campaigns.measures import MEASURES
+from passiflex.metrics.measures import MEASURES
 
 
 def worst_first(measure: str, values: Iterable[float | None], failures: Iterable[str]) -> list[int]:

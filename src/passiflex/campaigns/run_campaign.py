@@ -192,7 +192,7 @@ def _is_run_of(path: Path, campaign: Campaign, sample: int) -> bool:
     except PassiflexError:
         return False
     wanted = resolve(sample_scenario(campaign, sample))
-    return run.name == wanted.name and run.data.attrs.get("configuration") == wanted.text
+    return run.name == wanted.name and run.data.attrs.get("scenario") == wanted.text
 
 
 def _run_file(folder: Path, sample: int) -> Path:

@@ -13,9 +13,9 @@ from passiflex.campaigns.box import Box
 from passiflex.campaigns.campaign import Campaign
 from passiflex.campaigns.evaluate import evaluate_problems, together_or_alone
 from passiflex.campaigns.found import Best, Case, Found, case_scenario
-from passiflex.campaigns.measures import MEASURES
 from passiflex.campaigns.samples import values_of_row, with_values
 from passiflex.errors import NameUnknownError, PassiflexError, ValueRangeError
+from passiflex.metrics.measures import MEASURES
 from passiflex.problems.problem import Problem
 from passiflex.problems.resolution import resolve
 from passiflex.scenarios.scenario import Scenario

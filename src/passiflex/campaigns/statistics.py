@@ -16,11 +16,11 @@ from passiflex.campaigns.draws import columns, words
 from passiflex.campaigns.evaluate import REFUSED
 from passiflex.campaigns.importance import Association, Column, associations
 from passiflex.campaigns.intervals import Quantile, Share, quantile_of, require_level, share_of
-from passiflex.campaigns.measures import MEASURES
 from passiflex.campaigns.ranking import worst_first
 from passiflex.campaigns.samples import Values
 from passiflex.errors import NameUnknownError
-from passiflex.responses.steps import step_window
+from passiflex.metrics.measures import MEASURES
+from passiflex.metrics.steps import step_window
 
 Array = NDArray[np.float64]
 

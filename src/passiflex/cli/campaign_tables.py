@@ -9,9 +9,9 @@ from rich.text import Text
 
 from passiflex.campaigns.found import Found
 from passiflex.campaigns.importance import Association, Index
-from passiflex.campaigns.measures import with_unit
 from passiflex.campaigns.samples import Values
 from passiflex.campaigns.statistics import Statistics
+from passiflex.metrics.measures import with_unit
 
 MOST = 5
 """Rows for each metric of what it hangs on."""

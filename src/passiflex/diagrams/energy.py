@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from passiflex.diagrams.events import marks_of, scenario_of, spans_of
+from passiflex.diagrams.events import marks_of, spans_of
 from passiflex.diagrams.panel import Array, Curve, Level, Panel
 from passiflex.diagrams.viewed import Viewed, curve, curves, other_role, with_curves
 from passiflex.passivity import available_energy, port_tank
@@ -125,7 +125,7 @@ def _available(run: Run) -> Array:
 
 
 def _floor(run: Run) -> tuple[Level, ...]:
-    scenario = scenario_of(run)
+    scenario = run.scenario
     if scenario is None or scenario.tank is None:
         return ()
     return (Level(scenario.tank.floor, "T_min, floor of the tank"),)

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 import numpy as np
 from numpy.typing import NDArray
 
 from passiflex.diagrams.panel import Array, Mark, Span
-from passiflex.errors import ScenarioError
 from passiflex.runs.run import Run
 from passiflex.scenarios.scenario import Force, Scenario
-from passiflex.scenarios.scenario_file import parse_scenario
 
 GOVERNED = ("reference", "stiffness")
 """What the governor may hold back; its share is the signal NAME_share."""
@@ -19,23 +15,9 @@ APART = 0.05
 """Two stretches of the governor that are less than this [s] apart are shown as one."""
 
 
-def scenario_of(run: Run) -> Scenario | None:
-    """Return the scenario that a run carries as its resolved configuration; None if it cannot be read."""
-    return _parsed(str(run.data.attrs.get("configuration", "")))
-
-
-@lru_cache(maxsize=8)
-def _parsed(text: str) -> Scenario | None:
-    """Return the scenario of a text, which is asked for again and again; None if it is none."""
-    try:
-        return parse_scenario(text, source="the run's configuration")
-    except ScenarioError:
-        return None
-
-
 def marks_of(run: Run) -> tuple[Mark, ...]:
     """Return the instants at which something happened, in the order of time: reference, forces, gains, fallback."""
-    marks, scenario = [], scenario_of(run)
+    marks, scenario = [], run.scenario
     if scenario is not None:
         marks += [Mark(e.at, e.words()) for e in scenario.reference]
         marks += [Mark(s.start, s.label) for s in _forces(scenario)]
@@ -47,7 +29,7 @@ def marks_of(run: Run) -> tuple[Mark, ...]:
 
 def spans_of(run: Run) -> tuple[Span, ...]:
     """Return the stretches in which a force acted, the reference was held back, or the law had fallen back."""
-    scenario, end = scenario_of(run), _end(run)
+    scenario, end = run.scenario, _end(run)
     forces = _forces(scenario) if scenario is not None else []
     inside = [s._replace(end=min(s.end, end)) for s in forces if s.start < end]
     changing = scenario is None or bool(scenario.gain_changes)

@@ -6,11 +6,10 @@ import numpy as np
 
 from passiflex.control.gain_design import target_inertia
 from passiflex.control.motion import Pose
-from passiflex.diagrams.events import scenario_of
 from passiflex.diagrams.panel import Array
 from passiflex.errors import PassiflexError
+from passiflex.metrics.closed_form import ideal_displacement
 from passiflex.problems.timeline import timeline
-from passiflex.responses.closed_form import ideal_displacement
 from passiflex.runs.run import Run
 from passiflex.runs.run_arm import problem_of
 from passiflex.scenarios.scenario import Scenario
@@ -27,7 +26,7 @@ def ideal_motion(run: Run) -> Array | None:
     None if the configuration cannot be read or its robot not be found, and where something acts that the
     ideal does not know: gains that change in flight, drags, feed-forward wrenches, directions that are free.
     """
-    scenario = scenario_of(run)
+    scenario = run.scenario
     if scenario is None or scenario.gain_changes or scenario.environment or scenario.feedforward:
         return None
     if scenario.law.stiffness.free:

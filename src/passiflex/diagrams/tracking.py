@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from passiflex.diagrams.events import marks_of, scenario_of, spans_of
+from passiflex.diagrams.events import marks_of, spans_of
 from passiflex.diagrams.panel import Array, Curve, Panel
 from passiflex.diagrams.viewed import Viewed, curve, curves, first_finite, roles_of, with_curves
 from passiflex.runs.run import Run
@@ -100,5 +100,5 @@ def _length(vectors: Array) -> Array:
 
 def _orients(run: Run) -> bool:
     """Return whether the orientation is controlled: a position task leaves it to the null space."""
-    scenario = scenario_of(run)
+    scenario = run.scenario
     return scenario is None or scenario.law.task == "pose"

@@ -45,7 +45,7 @@ def write_rrd(run: Run, path: Path) -> None:
         recording.save(path, default_blueprint=_blueprint(stream, diagrams))
         recording.send_recording_name(run.name)
         recording.send_property("run", rr.AnyValues(**_properties(run)))
-        configuration = str(run.data.attrs.get("configuration", ""))
+        configuration = str(run.data.attrs.get("scenario", ""))
         stream.constant(["configuration"], rr.TextDocument(configuration))
         log_scene(stream, run, ideal)
         for panel in diagrams:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from passiflex.campaigns.intervals import Share
-from passiflex.campaigns.measures import MEASURES
 from passiflex.campaigns.page import Band, Bars, Ecdf, Page, Scatter
+from passiflex.metrics.measures import MEASURES
 from passiflex.plotting.figures import Series
 from passiflex.plotting.style import BLUE, LINES, ROLES, axis_label, figure_style
 

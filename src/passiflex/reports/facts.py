@@ -60,7 +60,7 @@ def made_by(run: Run) -> str:
 
 def shown_configuration(run: Run) -> str:
     """Return the resolved configuration, with a robot file by its name: where it lies is nobody else's business."""
-    text = str(run.data.attrs["configuration"])
+    text = str(run.data.attrs["scenario"])
     tree = Tree()
     try:
         robot = tree.read(text, "a configuration names a robot").get("robot")

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from passiflex.diagrams import KINDS, Viewed, marks_of, panels, roles_of, spans_of, viewed
-from passiflex.diagrams.events import scenario_of
 from passiflex.passivity import audit_if_possible
 from passiflex.plotting.style import ROLES, Role
 from passiflex.reports.arm import arm_header
@@ -49,7 +48,7 @@ def content(run: Run, others: Sequence[Run | Viewed] = (), notices: Sequence[str
         "title": run.name,
         "made_by": made_by(run),
         "notices": said,
-        "facts": facts(run, scenario_of(run)),
+        "facts": facts(run, run.scenario),
         "verdict": verdict,
         "metrics": metrics_header(
             [run, *(v.run for v in compared)], [main.label, *(v.label for v in compared)]

@@ -6,12 +6,11 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from passiflex.campaigns.measures import MEASURES, measures
-from passiflex.diagrams.events import scenario_of
 from passiflex.errors import PassiflexError
 from passiflex.loops.witness import ROUND_OFF
+from passiflex.metrics.measures import MEASURES, measures
+from passiflex.metrics.steps import step_window
 from passiflex.passivity import Audit, audit_if_possible
-from passiflex.responses.steps import step_window
 from passiflex.runs.run_arm import problem_of
 from passiflex.simulation import Run
 
@@ -80,7 +79,7 @@ def _measured(run: Run) -> dict[str, float | str]:
     result = audit_if_possible(run)
     if result is None:
         return {"end_time": float(run.time[-1])}
-    scenario = scenario_of(run)
+    scenario = run.scenario
     try:
         problem = None if scenario is None else problem_of(run, scenario)
         if (

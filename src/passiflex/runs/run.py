@@ -20,9 +20,11 @@ from passiflex.loops.plant import Plant
 from passiflex.loops.witness import Noted
 from passiflex.origin import package_version, source_commit
 from passiflex.problems.unbooked import UNKNOWN, unbooked
-from passiflex.runs.run_attributes import wrong_attributes, wrong_units
+from passiflex.runs.run_attributes import renamed, wrong_attributes, wrong_units
 from passiflex.runs.run_bounds import require_bounded
 from passiflex.runs.run_file import FORMAT, cut_short, defects, foreign, require_file, unreadable
+from passiflex.runs.run_scenario import scenario_of_text
+from passiflex.scenarios.scenario import Scenario
 
 if TYPE_CHECKING:
     from passiflex.problems.problem import Problem
@@ -53,6 +55,11 @@ class Run:
     def name(self) -> str:
         """Return the name of the scenario."""
         return str(self.data.attrs["name"])
+
+    @property
+    def scenario(self) -> Scenario | None:
+        """Return the scenario that it was made from; None where the run carries none that can be read."""
+        return scenario_of_text(str(self.data.attrs.get("scenario", "")))
 
     @property
     def sampled(self) -> bool:
@@ -136,7 +143,7 @@ class Run:
         require_file(path)
         try:
             require_bounded(path)
-            data = xr.load_dataset(path, engine="h5netcdf")
+            data = renamed(xr.load_dataset(path, engine="h5netcdf"))
         except RunFileError:
             raise
         except Exception as error:  # the readers raise many kinds for a file that is no netCDF
@@ -213,7 +220,7 @@ def assemble(
         "robot_description": _description(problem),
         "joint_parameters": json.dumps({name: getattr(robot, name).tolist() for name in JOINT_PARAMETERS}),
         "law": type(problem.law).__name__,
-        "configuration": problem.text,
+        "scenario": problem.text,
         "sources": json.dumps(robot.sources, ensure_ascii=False),
         "seed": problem.seed,
         "unbooked": unbooked(problem),

@@ -90,7 +90,7 @@ def _candidates(run: Run) -> Iterator[SerialChain]:
     if "<" in text and "<!" not in text:  # anything else would be a path, or is none of ours
         with suppress(PassiflexError, ValueError, RecursionError):  # the catalogue may know the robot
             yield replace(read_chain(text).chain, name=name or "arm")
-    settings = _settings(str(run.data.attrs.get("configuration", "")))
+    settings = _settings(str(run.data.attrs.get("scenario", "")))
     if settings is not None:
         robot, tool = settings
         yield read_description(robot).chain.with_tool(tool.position, tool.rotation_vector)

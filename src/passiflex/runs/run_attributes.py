@@ -55,7 +55,7 @@ KINDS: dict[str, Any] = {
     "robot_description": Text,
     "joint_parameters": Annotated[Text, AfterValidator(_mapping)],
     "law": Name,
-    "configuration": Annotated[str, Field(max_length=MAX_BYTES)],
+    "scenario": Annotated[str, Field(max_length=MAX_BYTES)],
     "sources": Annotated[Text, AfterValidator(_mapping)],
     "seed": Annotated[int, Field(ge=0)],
     "unbooked": Text,
@@ -71,6 +71,17 @@ KINDS: dict[str, Any] = {
 }
 """Attribute → what it is."""
 _ADAPTERS = {name: TypeAdapter(kind, config=ConfigDict(strict=True)) for name, kind in KINDS.items()}
+
+
+FORMER = {"configuration": "scenario"}
+"""Attributes by the names that they had in files of before."""
+
+
+def renamed(data: xr.Dataset) -> xr.Dataset:
+    """Return the signals with attributes by the names that they have now."""
+    old = {former: now for former, now in FORMER.items() if former in data.attrs and now not in data.attrs}
+    data.attrs = {old.get(str(name), name): value for name, value in data.attrs.items()}
+    return data
 
 
 def wrong_attributes(attributes: Mapping[Any, Any]) -> dict[str, str]:

@@ -46,7 +46,7 @@ CONTINUOUS = (
     "spilled_energy",
     *(f"{flow}_power" for flow in ("reference", "drawn", "spilled")),
 )
-ATTRIBUTES = ("name", "failure", "events", "has_tank", "configuration", "control_period")
+ATTRIBUTES = ("name", "failure", "events", "has_tank", "scenario", "control_period")
 LOOKED_AT = (
     "q", "theta", "dq", "dtheta", "position", "rotation", "desired_position", "desired_rotation", "tau_m", "tau_a",
     "tau_e", "wrench", "torque_limit",

@@ -11,7 +11,7 @@ import xarray as xr
 from passiflex.errors import RunFileError
 from passiflex.files import as_path
 from passiflex.runs.run import Run
-from passiflex.runs.run_attributes import without_units, wrong_attributes, wrong_units
+from passiflex.runs.run_attributes import renamed, without_units, wrong_attributes, wrong_units
 from passiflex.runs.run_bounds import require_bounded
 from passiflex.runs.run_file import FORMAT, cut_short, foreign, remarks, require_file, unreadable
 from passiflex.runs.sound import sound_signals
@@ -21,7 +21,7 @@ DEFAULTS: dict[str, Any] = {
     "name": "a run without a name",
     "failure": "",
     "events": "[]",
-    "configuration": "",
+    "scenario": "",
     "control_period": 0.0,
     "duration": 0.0,
 }
@@ -62,7 +62,7 @@ def salvage(path: str | Path) -> Salvaged:
         notices.append(
             f"The file is a {data.attrs['format']!r}, not a {FORMAT!r}: shown is what has the same name in both."
         )
-    data = _with_attributes(data, notices)
+    data = _with_attributes(renamed(data), notices)
     data = _rows_in_order(_with_seconds(path, data), notices)
     data = sound_signals(data, notices)
     if (lacking := _lacking(data)) is not None:

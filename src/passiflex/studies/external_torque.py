@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from passiflex.metrics.numbers import rms
+from passiflex.metrics.steps import displacement
 from passiflex.passivity import audit
-from passiflex.responses.metrics import rms
-from passiflex.responses.steps import displacement
 from passiflex.scenarios.control_settings import Control, SensorSettings
 from passiflex.scenarios.gain_settings import ShapedInertia, ShapedStiffness
 from passiflex.scenarios.law_settings import ImpedanceSettings

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from passiflex.control.gain_design import target_inertia
 from passiflex.control.law import ImpedanceLaw
 from passiflex.errors import NameUnknownError
+from passiflex.metrics.msd import IdealResponse, ideal_response
 from passiflex.problems.natural_inertia import natural_inertia
-from passiflex.responses.msd import IdealResponse, ideal_response
 from passiflex.scenarios.gain_settings import TargetInertia
 from passiflex.scenarios.law_settings import ImpedanceSettings, RigidSettings
 from passiflex.simulation import Problem, Run, Scenario, parse_scenario, resolve, simulate_problem

@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 from passiflex.diagrams import Viewed
 from passiflex.errors import NameUnknownError
 from passiflex.files import require_writable, whole_file
+from passiflex.metrics.steps import displacement
 from passiflex.origin import package_version, source_commit
 from passiflex.passivity import claimed_balance
 from passiflex.plotting.figures import CircleColumn, Series, StepColumn, draw_circle, draw_steps, save_figure
 from passiflex.reports import write_report
 from passiflex.reports.viewer import read_viewer
-from passiflex.responses.steps import displacement
 from passiflex.robots import FlexibleJointRobot
 from passiflex.scenarios.law_settings import ImpedanceSettings
 from passiflex.simulation import Scenario

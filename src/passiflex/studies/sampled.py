@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 
 from passiflex.diagrams import Viewed
 from passiflex.files import require_writable
+from passiflex.metrics.msd import IdealResponse
+from passiflex.metrics.numbers import rms
+from passiflex.metrics.steps import displacement, step_window
 from passiflex.passivity import Audit, audit, port_tank
 from passiflex.plotting.figures import save_figure
 from passiflex.plotting.sampled import SampledPanel, draw_sampled
 from passiflex.reports import write_report
-from passiflex.responses.metrics import rms
-from passiflex.responses.msd import IdealResponse
-from passiflex.responses.steps import displacement, step_window
 from passiflex.scenarios.control_settings import MotorSettings
 from passiflex.scenarios.environment import Drag
 from passiflex.scenarios.law_settings import ImpedanceSettings

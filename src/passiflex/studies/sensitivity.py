@@ -12,12 +12,12 @@ from typing import NamedTuple
 import numpy as np
 
 from passiflex.files import require_writable, whole_file
+from passiflex.metrics.msd import ideal_response
+from passiflex.metrics.numbers import largest_rise
+from passiflex.metrics.steps import displacement, step_numbers, step_window
 from passiflex.passivity import audit, claimed_balance
 from passiflex.plotting.figures import save_figure
 from passiflex.plotting.sensitivity import Sweep, draw_sensitivity
-from passiflex.responses.metrics import largest_rise
-from passiflex.responses.msd import ideal_response
-from passiflex.responses.steps import displacement, step_numbers, step_window
 from passiflex.robots import FlexibleJointRobot
 from passiflex.scenarios.reference import Circle
 from passiflex.simulation import Scenario, resolve, simulate_problem

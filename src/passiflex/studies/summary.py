@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from passiflex.metrics.msd import IdealResponse
+from passiflex.metrics.numbers import largest_rise, rms
+from passiflex.metrics.steps import StepWindow, displacement, step_numbers, step_window
 from passiflex.passivity import audit, claimed_balance
-from passiflex.responses.metrics import largest_rise, rms
-from passiflex.responses.msd import IdealResponse
-from passiflex.responses.steps import StepWindow, displacement, step_numbers, step_window
 from passiflex.scenarios.reference import Circle
 from passiflex.simulation import Run
 from passiflex.studies.paper import Case

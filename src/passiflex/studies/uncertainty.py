@@ -17,10 +17,10 @@ from passiflex.campaigns.page import Page, ideal_along, page
 from passiflex.campaigns.statistics import Statistics, numbers_of, statistics
 from passiflex.chunks.run_chunks import Progress, sparsely
 from passiflex.files import require_writable
+from passiflex.metrics.steps import step_window
 from passiflex.plotting.figures import Series, save_figure
 from passiflex.plotting.uncertainty import UncertainColumn, draw_uncertainty
 from passiflex.reports import write_report
-from passiflex.responses.steps import step_window
 from passiflex.scenarios.control_settings import Control
 from passiflex.scenarios.model_errors import ModelErrors
 from passiflex.simulation import Scenario

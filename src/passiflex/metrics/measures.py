@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from passiflex.control.gain_design import target_inertia
+from passiflex.metrics.closed_form import ideal_displacement
+from passiflex.metrics.numbers import rms
+from passiflex.metrics.steps import StepWindow, displacement, step_numbers
 from passiflex.passivity import audit
 from passiflex.passivity.ledger import Signals
 from passiflex.problems.problem import Problem, SampledProblem
-from passiflex.responses.closed_form import ideal_displacement
-from passiflex.responses.metrics import rms
-from passiflex.responses.steps import StepWindow, displacement, step_numbers
 
 Array = NDArray[np.float64]
 

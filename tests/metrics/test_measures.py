@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 import passiflex
-from passiflex.campaigns import measures as module
-from passiflex.campaigns.measures import MEASURES, SIGNALS, measures
+from passiflex.metrics import measures as module
+from passiflex.metrics.measures import MEASURES, SIGNALS, measures
+from passiflex.metrics.msd import ideal_response
+from passiflex.metrics.steps import step_window
 from passiflex.problems.problem import Event, SampledProblem
-from passiflex.responses.msd import ideal_response
-from passiflex.responses.steps import step_window
 from passiflex.simulation import Run, Scenario, resolve, simulate_problem
 from passiflex.simulation.batch import digest_batch, simulate_in_lane
 from worlds import merged, world
@@ -52,7 +52,9 @@ WORLDS: dict[str, dict[str, Any]] = {
     ),
     "rigid": {
         **SAMPLED,
-        "robot": str(Path(__file__).parent / "turret.yaml"),  # the rigid law needs three joints
+        "robot": str(
+            Path(__file__).parents[1] / "campaigns" / "turret.yaml"
+        ),  # the rigid law needs three joints
         "posture": [0.2, 0.5, 0.8],
         "law": {
             "type": "rigid",

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from passiflex.responses.metrics import overshoot, rms, settling_time
+from passiflex.metrics.numbers import overshoot, rms, settling_time
 from passiflex.scenarios.reference import Step
 from passiflex.scenarios.scenario import Scenario
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from passiflex.responses.steps import StepWindow, displacement, step_numbers, step_window
+from passiflex.metrics.steps import StepWindow, displacement, step_numbers, step_window
 from worlds import world
 
 H = 1e-3

@@ -8,10 +8,10 @@ from scipy.spatial.transform import Rotation
 
 from loops import definite
 from passiflex.control.motion import Motion, Pose, circle, hold, minimum_jerk
+from passiflex.metrics import closed_form
+from passiflex.metrics.closed_form import ideal_displacement
+from passiflex.metrics.msd import ideal_response
 from passiflex.problems.problem import Event
-from passiflex.responses import closed_form
-from passiflex.responses.closed_form import ideal_displacement
-from passiflex.responses.msd import ideal_response
 
 HOME = Pose(np.array([0.4, -0.2, 0.7]), Rotation.from_rotvec([0.3, -0.2, 1.0]).as_matrix())
 NONE = np.zeros(6)

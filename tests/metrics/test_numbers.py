@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from passiflex.responses.metrics import largest_rise, overshoot, rms, settling_time
+from passiflex.metrics.numbers import largest_rise, overshoot, rms, settling_time
 
 H = 1e-3
 TIME = np.arange(20_001) * H

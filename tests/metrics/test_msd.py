@@ -8,8 +8,8 @@ import scipy.linalg
 
 from passiflex.control.gain_design import target_inertia
 from passiflex.control.motion import Motion, Pose, circle, hold, minimum_jerk
+from passiflex.metrics.msd import IdealResponse, ideal_response
 from passiflex.problems.problem import Event
-from passiflex.responses.msd import IdealResponse, ideal_response
 
 M, D, K = 3.4, 20.0, 60.0
 OMEGA = np.sqrt(K / M)
