@@ -200,3 +200,62 @@ def test_a_module_is_short(path: Path) -> None:
 
 def test_no_module_has_an_empty_name() -> None:
     assert [dotted_name(path) for path in MODULES if EMPTY_NAMES & set(dotted_name(path).split("."))] == []
+
+
+def _names(tree: ast.AST) -> Iterator[str]:
+    """Yield what is imported, at any depth; but for what only a type checker reads, which nothing waits for."""
+    nodes = [tree]
+    while nodes:
+        node = nodes.pop()
+        if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node.test):
+            nodes += node.orelse
+            continue
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+        nodes += ast.iter_child_nodes(node)
+
+
+def _imported(trees: dict[str, ast.AST]) -> dict[str, set[str]]:
+    """Return the modules that each module imports."""
+    graph: dict[str, set[str]] = {module: set() for module in trees}
+    for module, tree in trees.items():
+        for name in _names(tree):
+            while name and name not in trees:
+                name = name.rpartition(".")[0]
+            graph[module] |= {name} - {"", module, "passiflex"}
+    return graph
+
+
+def circles(trees: dict[str, ast.AST]) -> list[str]:
+    """Return the modules that import themselves by way of others."""
+    graph = _imported(trees)
+    for door, room in UPWARD.items():
+        graph[door] = {m for m in graph.get(door, set()) if room_of(m) != room}
+
+    def reached(module: str) -> set[str]:
+        found, waiting = set[str](), list(graph[module])
+        while waiting:
+            if (here := waiting.pop()) not in found:
+                found.add(here)
+                waiting += graph[here]
+        return found
+
+    return [module for module in graph if module in reached(module)]
+
+
+def test_no_imports_go_in_a_circle() -> None:
+    assert circles({dotted_name(path): ast.parse(path.read_text()) for path in MODULES}) == []
+
+
+def test_a_circle_is_seen() -> None:
+    texts = {
+        "passiflex.a": "def f():\n    from passiflex.b import g",
+        "passiflex.b": "from passiflex import c",
+        "passiflex.c": "import passiflex.a",
+        "passiflex.d": "if TYPE_CHECKING:\n    from passiflex import d\nimport passiflex.a",
+    }
+    assert circles({name: ast.parse(text) for name, text in texts.items()}) == [
+        "passiflex.a", "passiflex.b", "passiflex.c",
+    ]  # fmt: skip

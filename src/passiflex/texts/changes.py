@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from typing import Any, TypeVar, get_args
+from typing import TYPE_CHECKING, Any, TypeVar, cast, get_args
 
 from pydantic import BaseModel, ValidationError
 
 from passiflex.errors import ScenarioError
 from passiflex.texts.model_mistakes import fields, former_names, models, tag_field, told
-from passiflex.texts.section import Section
 from passiflex.texts.yaml_tree import dotted
 
-S = TypeVar("S", bound=Section)
+if TYPE_CHECKING:  # a section is changed by this module
+    from passiflex.texts.section import Section
+
+S = TypeVar("S", bound="Section")
 Model = type[BaseModel]
 
 _NAME = r"[^\W\d]\w*(?:\[[0-9]+\])*"
@@ -122,7 +124,8 @@ def _names(model: Model) -> dict[str, str]:
 
 
 def _as_now(model: Model, name: str, value: Any) -> Any:
-    return model.from_former(name, value) if issubclass(model, Section) else value
+    section = cast("type[Section]", model)
+    return section.from_former(name, value) if hasattr(model, "from_former") else value
 
 
 def _chosen(here: tuple[Model, ...], old: Any) -> Model | None:

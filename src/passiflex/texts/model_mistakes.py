@@ -11,8 +11,8 @@ from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
 from passiflex.errors import nearest
+from passiflex.texts.mistakes import Mistakes
 from passiflex.texts.quantity import shown
-from passiflex.texts.section import Mistakes, Section
 from passiflex.texts.yaml_tree import Place, dotted
 
 REFUSED_NAME = "refused_name"
@@ -116,7 +116,7 @@ def readable(model: Model) -> dict[str, FieldInfo]:
 
 def former_names(model: Model) -> dict[str, str]:
     """Return former name → name of the entries of a model that had another."""
-    return model.former_names() if issubclass(model, Section) else {}
+    return getattr(model, "former_names", dict[str, str])()  # of a `Section`
 
 
 def models(annotation: Any) -> Iterator[Model]:

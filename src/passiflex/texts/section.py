@@ -1,4 +1,4 @@
-"""What every mapping of a file has in common, and how it reports mistakes."""
+"""What every mapping of a file has in common, and how it is changed."""
 
 from __future__ import annotations
 
@@ -10,16 +10,9 @@ from typing import TYPE_CHECKING, Any, ClassVar, NoReturn, Self
 from pydantic import AliasChoices, BaseModel, ConfigDict, model_validator
 
 from passiflex.errors import ArgumentError, FrozenError
+from passiflex.texts.mistakes import Mistakes as Mistakes
 
 NOTHING: Mapping[str, Any] = MappingProxyType({})
-
-
-class Mistakes(ValueError):  # noqa: N818 - one exception for all of them
-    """Mistakes found in one value, each with its place below that value."""
-
-    def __init__(self, *entries: tuple[tuple[str | int, ...], str]):
-        self.entries = entries
-        super().__init__("; ".join(".".join(map(str, (*place, text))) for place, text in entries))
 
 
 class Section(BaseModel):
