@@ -1,6 +1,7 @@
 """Imports run one way, modules stay short, and every module is named after its one idea."""
 
 import ast
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -259,3 +260,13 @@ def test_a_circle_is_seen() -> None:
     assert circles({name: ast.parse(text) for name, text in texts.items()}) == [
         "passiflex.a", "passiflex.b", "passiflex.c",
     ]  # fmt: skip
+
+
+def test_the_order_is_told_as_it_is() -> None:
+    """To those who read the package's first lines, and to those who contribute."""
+    root = SOURCE.parents[1]
+    first = (SOURCE / "__init__.py").read_text().split("The rooms,")[1].split('"""')[0]
+    told = (root / "CONTRIBUTING.md").read_text().split("Imports run one way:")[1].split("`cli`")[0] + "`cli`"
+    rooms = ROOMS[len(FOUNDATION) :]
+    assert tuple(re.findall(r"`(\w+)`", first)) == rooms
+    assert tuple(re.findall(r"`(\w+)`", told)) == (*FOUNDATION, *rooms)

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from types import SimpleNamespace
-from typing import Any
+from typing import ClassVar
 
 import casadi as cs
 import numpy as np
 import pytest
 from hypothesis import given, settings
+from scipy.spatial.transform import Rotation
 
 from arms import serial_chains
 from loops import SEEDS, with_joints
@@ -26,22 +27,35 @@ def numbers(layout: Layout, rng: np.random.Generator) -> dict[str, np.ndarray]:
     return {f.name: rng.uniform(0, 5, f.shape) + 1e-2 * f.name.endswith("width") for f in layout}
 
 
-def balance(element: AbstractElement, seed: int) -> tuple[float, float]:
-    """Return the power through the port plus the loss, and the loss."""
+def balance(element: AbstractElement, seed: int) -> tuple[float, float, float]:
+    """Return the power through the port, plus the loss, plus the rate of what is stored; the loss; and their size.
+
+    The rate is the derivative of what is stored along the motion of motors and end effector, and of its own state.
+    """
     rng = np.random.default_rng(seed)
     m, s = (numbers(layout, rng) for layout in (element.parameters(N), element.inputs()))
     speed = 10 ** rng.uniform(-6, 1)
-    parts = [cs.SX(rng.normal(size=N) * scale) for scale in (1, 1, speed, speed)]
-    vectors = [cs.SX(rng.normal(size=3) * speed) for _ in range(2)]
-    at = Touch(_state(parts), *vectors, cs.SX(rng.normal(size=3)), cs.SX.eye(3), SimpleNamespace())
-    effect = element.act(at, _expressions(s), _expressions(m))
-    at_tip = cs.dot(effect.force, at.velocity) + cs.dot(effect.moment, at.spin)
-    given = cs.dot(effect.motor, at.x.dtheta) + at_tip
-    return float(given + effect.lost), float(effect.lost)
+    dq, dtheta = (cs.SX(rng.normal(size=N) * speed) for _ in range(2))
+    velocity, spin = (cs.SX(rng.normal(size=3) * speed) for _ in range(2))
+    own, layout = element.state(N).symbols("own")[0], element.state(N)
+    sizes = {"q": (N, 1), "theta": (N, 1), "position": (3, 1), "rotation": (3, 3)}
+    at = {name: cs.SX.sym(name, *size) for name, size in sizes.items()}
+    state = SimpleNamespace(q=at["q"], theta=at["theta"], dq=dq, dtheta=dtheta)
+    touch = Touch(state, velocity, spin, at["position"], at["rotation"], layout.view(own))
+    effect = element.act(touch, _expressions(s), _expressions(m))
+    places = cs.vertcat(at["q"], at["theta"], at["position"], cs.vec(at["rotation"]), own)
+    turning = at["rotation"] @ cs.skew(spin)
+    moving = cs.vertcat(dq, dtheta, at["rotation"] @ velocity, cs.vec(turning), effect.rate)
+    rate = cs.jtimes(effect.stored, places, moving)
+    given = cs.dot(effect.motor, dtheta) + cs.dot(effect.force, velocity) + cs.dot(effect.moment, spin)
+    there = np.concatenate([rng.normal(size=2 * N + 3), _turned(rng).ravel(), rng.normal(size=layout.size)])
+    f = cs.Function("f", [places], [given, effect.lost, rate])
+    parts = [float(value) for value in f(there)]
+    return sum(parts), parts[1], sum(map(abs, parts))
 
 
-def _state(parts: list[cs.SX]) -> Any:
-    return SimpleNamespace(q=parts[0], theta=parts[1], dq=parts[2], dtheta=parts[3])
+def _turned(rng: np.random.Generator) -> np.ndarray:
+    return Rotation.random(random_state=rng).as_matrix()
 
 
 def _expressions(values: dict[str, np.ndarray]) -> SimpleNamespace:
@@ -50,12 +64,37 @@ def _expressions(values: dict[str, np.ndarray]) -> SimpleNamespace:
 
 def require_honest(element: AbstractElement) -> None:
     for seed in range(200):
-        left, lost = balance(element, seed)
+        left, lost, size = balance(element, seed)
         assert lost >= 0
-        assert abs(left) <= 1e-13 * lost
+        assert abs(left) <= 1e-13 * size
 
 
-@pytest.mark.parametrize("element", ELEMENTS, ids=lambda e: type(e).__name__)
+@dataclass(frozen=True)
+class Bob(AbstractElement):
+    """A mass of its own, on a spring and a damper at the end effector, and a turned spring that it may lie about."""
+
+    lie: str = ""
+    stores: ClassVar[bool] = True
+
+    def state(self, n: int) -> Layout:
+        return Layout((Field("bob", (3,), "m"), Field("bob_speed", (3,), "m/s")))
+
+    def act(self, at: Touch, s: SimpleNamespace, m: SimpleNamespace) -> Effect:
+        stretch, speed = at.position - at.own.bob, at.rotation @ at.velocity - at.own.bob_speed
+        pull = 50 * stretch + 3 * speed
+        up = at.rotation[:, 2]
+        stored = 25 * cs.sumsqr(stretch) + cs.sumsqr(at.own.bob_speed) / 4 - 2 * up[2]
+        turning = at.rotation.T @ cs.cross(up, cs.DM([0, 0, 2]))
+        return nothing(N)._replace(
+            force=-at.rotation.T @ pull,
+            moment=turning if self.lie != "turns" else -turning,
+            lost=3 * cs.sumsqr(speed),
+            stored=1.1 * stored if self.lie == "boasts" else stored,
+            rate=cs.vertcat(at.own.bob_speed, (1 if self.lie == "is heavier" else 2) * pull),
+        )
+
+
+@pytest.mark.parametrize("element", [*ELEMENTS, Bob()], ids=lambda e: type(e).__name__)
 def test_an_element_gives_nothing_of_its_own(element: AbstractElement) -> None:
     require_honest(element)
 
@@ -80,6 +119,12 @@ class Liar(AbstractElement):
         return nothing(N)._replace(force=force, moment=moment, lost=lost)
 
 
+@pytest.mark.parametrize("lie", ["turns", "boasts", "is heavier"])
+def test_an_element_that_lies_of_what_it_stores_is_found(lie: str) -> None:
+    with pytest.raises(AssertionError):
+        require_honest(Bob(lie))
+
+
 @pytest.mark.parametrize("how", ["pushes", "hides", "forgets the moment"])
 def test_an_element_that_lies_is_found(how: str) -> None:
     with pytest.raises(AssertionError):
@@ -95,7 +140,7 @@ def test_what_passes_the_ports_is_what_the_robot_stores_and_loses(chain: SerialC
     state, u = cs.SX.sym("x", 4 * n), cs.SX.sym("u", n + plant.environment.size)
     p, m = plant.parameters.symbols("p")
     x, s = plant.view(state), plant.environment.view(u[n:])
-    true = {signal.field.name: signal.value for signal in plant.true(state, s, m)}
+    true = {signal.field.name: signal.value for signal in plant.true(state, s, m).signals}
     parts = ("link_kinetic", "motor_kinetic", "joint_spring", "potential")
     energy = sum(true[f"{part}_energy"] for part in parts)
     slope, powers = plant.rhs(state, u, p)

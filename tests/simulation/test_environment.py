@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, ClassVar, Literal
 
@@ -14,7 +15,7 @@ import passiflex as pf
 from passiflex.control.motion import Pose
 from passiflex.elements import AbstractElement, Effect, Touch, nothing
 from passiflex.layout import Field, Layout
-from passiflex.passivity import audit, environment_balance, robot_balance
+from passiflex.passivity import audit, environment_balance
 from passiflex.simulation import Run, resolve
 from worlds import world
 
@@ -22,8 +23,12 @@ CONTINUOUS: dict[str, Any] = {"control": None, "tank": None, "noise": None}
 DRAG = {"environment": [{"kind": "drag", "from": 0.12, "to": 0.4, "viscous": 30.0, "dry": 0.5}]}
 RUBBING = {"motors": {"coulomb_friction": [0.3, 0.1], "viscous_friction": 0.5, "friction_width": 0.05}}
 PUSH = {"forces": [{"from": 0.05, "to": 0.15, "force": [3, 0, 10]}], "duration": 0.5}
-CLOSES = 2e-6
-"""Residual [J] of a run in which a joule goes round; the integrator leaves 6e-7 of it without any element."""
+TURRET = str(Path(__file__).parents[1] / "campaigns" / "turret.yaml")
+"""Of three joints, which the rigid law needs."""
+RIGID: dict[str, Any] = {
+    "type": "rigid", "task": "position", "stiffness": {"translation": 60}, "damping": {"translation": 20},
+    "target_inertia": {"translation": 3}, "gravity": "robot", "shaped_stiffness": None, "shaped_inertia": None,
+}  # fmt: skip
 WAYS = {"continuous": CONTINUOUS, "sampled": {"control": {"rate": 16000}}}
 
 
@@ -91,8 +96,9 @@ def ran(way: str, elements: tuple[AbstractElement, ...] = (), **changes: Any) ->
 def test_the_books_close(way: str, what: dict[str, Any]) -> None:
     run, free = ran(way, **what), ran(way)
     assert np.abs(run["q"] - free["q"]).max() > 1e-3
-    assert robot_balance(run).worst < CLOSES
-    assert audit(run).ledger_residual < CLOSES
+    assert (
+        audit(run).ledger_residual < 3 * audit(free).ledger_residual
+    )  # what the integrator leaves without them
     names = [e.name for e in run.elements]
     assert names == ["friction"] * ("motors" in what or way == "sampled") + ["drag"] * ("environment" in what)
     for name in names:
@@ -104,24 +110,52 @@ def test_the_books_close(way: str, what: dict[str, Any]) -> None:
         assert environment_balance(run).worst < 1e-10
 
 
+@pytest.mark.parametrize("interval", [0.001, 0.5])
+def test_dry_friction_is_resolved_however_few_rows_there_are(interval: float) -> None:
+    """It changes its sign within 10 µs where a joint turns; steps for the arm alone missed up to 2 mJ of it."""
+    dry = {"coulomb_friction": [1.0, 0.5], "friction_width": 1e-3}
+    drag = {"kind": "drag", "from": 0.1, "to": 0.4, "viscous": 20.0, "dry": 5.0}
+    run = ran("continuous", motors=dry, environment=[drag], output_interval=interval)
+    assert run["friction_energy"][-1] > 0.01
+    assert audit(run).ledger_residual < 1e-7
+
+
+@pytest.mark.parametrize("law", ["impedance", "rigid"])
 @pytest.mark.parametrize("what", [DRAG, RUBBING], ids=["drag", "friction"])
-def test_a_fast_clock_does_what_continuous_time_does(what: dict[str, Any]) -> None:
-    """At 16 kHz the hold's half period is all that is left: the same motion to a few 1e-4 of it."""
-    law = {"law": {"shaped_inertia": {"ratio": 1}}}
-    slow, fast = (ran(way, **what, **law) for way in WAYS)
-    moved = np.abs(slow["q"] - slow["q"][0]).max()
-    np.testing.assert_allclose(fast["q"], slow["q"], atol=2e-3 * moved)
+def test_a_faster_clock_comes_nearer_to_continuous_time(what: dict[str, Any], law: str) -> None:
+    """What a hold of half a period makes is of first order: twice the rate, half the distance. Both laws feel drag."""
+    laws: dict[str, Any] = {
+        "impedance": {"law": {"shaped_inertia": {"ratio": 1}}},
+        "rigid": {"robot": TURRET, "posture": [0.3, 0.5, 0.8], "law": RIGID},
+    }
+    slow = ran("continuous", **what | laws[law] | _fitting(what, law))
+    far = []
+    for rate in (4000, 8000, 16000):
+        control = {"control": {"rate": rate, "external_torque": "measured"}, "tank": None}
+        run = pf.simulate(world(**PUSH, **control, **what | laws[law] | _fitting(what, law)))
+        far.append(np.abs(run["q"] - slow["q"]).max())
+    assert far[0] / far[1] == pytest.approx(2, rel=0.1)
+    assert far[1] / far[2] == pytest.approx(2, rel=0.1)
+
+
+def _fitting(what: dict[str, Any], law: str) -> dict[str, Any]:
+    """Return friction for as many motors as the robot of the law has."""
+    if law == "impedance" or "motors" not in what:
+        return {}
+    return {"motors": what["motors"] | {"coulomb_friction": [0.3, 0.2, 0.1]}}
 
 
 def test_viscous_drag_alone_is_a_damper_of_the_law() -> None:
-    """In all directions and for all time: D_x + c, to the stretch of the joints, which are 1000 times stiffer here."""
-    stiff = {"deviations": {"joint_stiffness": 999}, "model_errors": {"joint_stiffness": 999}}
-    drag = {"environment": [{"kind": "drag", "from": 0, "to": 9, "viscous": 15.0}]}
-    damped = {"law": {"damping": {"translation": 55.0}}}
-    law = {"law": {"damping": {"translation": 40.0}}}
-    ours, theirs = ran("continuous", **drag, **law, **stiff), ran("continuous", **damped, **stiff)
-    moved = np.abs(ours["position"] - ours["position"][0]).max()
-    np.testing.assert_allclose(ours["position"], theirs["position"], atol=1e-3 * moved)
+    """In all directions and for all time D_x + c, but for the stretch of the joints: ten times stiffer, a tenth."""
+    far = []
+    for stiffer in (99.0, 999.0):
+        stiff = {name: {"joint_stiffness": stiffer} for name in ("deviations", "model_errors")}
+        drag = {"environment": [{"kind": "drag", "from": 0, "to": 9, "viscous": 15.0}]}
+        ours = ran("continuous", **drag, **stiff)
+        theirs = ran("continuous", law={"damping": {"translation": 55.0}}, **stiff)
+        far.append(np.abs(ours["position"] - theirs["position"]).max())
+    assert far[0] / far[1] == pytest.approx(10, rel=0.15)
+    assert np.ptp(ours["position"], axis=0).max() > 100 * far[1]
 
 
 def test_a_run_without_them_has_nothing_of_them() -> None:
@@ -134,7 +168,7 @@ def test_a_run_without_them_has_nothing_of_them() -> None:
 @pytest.mark.parametrize("way", WAYS)
 def test_an_element_that_stores_and_remembers_keeps_books(way: str) -> None:
     run = ran(way, (Bumper(),))
-    assert audit(run).ledger_residual < CLOSES
+    assert audit(run).ledger_residual < 3 * audit(ran(way)).ledger_residual
     assert np.ptp(run["bumper_position"], axis=0).max() > 0.01
     assert run["bumper_storage"].max() > 0.01
     assert run["bumper_energy"][-1] > 1e-3
@@ -154,14 +188,14 @@ def test_an_element_that_stores_and_remembers_keeps_books(way: str) -> None:
 )
 def test_an_element_that_lies_is_found_in_the_books_of_a_run(way: str, lies: str) -> None:
     run = pf.simulate(world(**PUSH | {"duration": 0.2}, **WAYS[way]), elements=[Bumper(40.0, 1.0, lies=lies)])
-    assert environment_balance(run).worst > 50 * CLOSES
+    assert environment_balance(run).worst > 100 * audit(ran(way)).ledger_residual
     assert audit(run).ledger_residual == environment_balance(run).worst
 
 
 @pytest.mark.parametrize("way", WAYS)
 def test_an_element_on_the_motors(way: str) -> None:
     honest, liar = ran(way, (Flywheel(),)), ran(way, (Flywheel(honest=False),))
-    assert audit(honest).ledger_residual < CLOSES
+    assert audit(honest).ledger_residual < 3 * audit(ran(way)).ledger_residual
     assert honest["flywheel_energy"][-1] > 0.01
     assert audit(liar).ledger_residual > 0.01
 

@@ -1,4 +1,4 @@
-"""The ideal mass-spring-damper that a run is held against, from the run's own configuration."""
+"""The ideal mass-spring-damper that a run is held against, from the run's own scenario."""
 
 from __future__ import annotations
 
@@ -23,10 +23,12 @@ ANYWHERE = Pose(np.zeros(3), np.eye(3))
 def ideal_motion(run: Run) -> Array | None:
     """Return the displacement of M_x ẍ + D_x ẋ + K_x (x − x_d) = F_e at the rows of a run, (N, 3) m.
 
-    None if the configuration cannot be read or its robot not be found, and where something acts that the
-    ideal does not know: gains that change in flight, drags, feed-forward wrenches, directions that are free.
+    None if the scenario cannot be read or its robot not be found, and where something acts that the
+    ideal does not know: gains that change in flight, drags, feed-forward wrenches, free directions, parts of one's own.
     """
     scenario = run.scenario
+    if run.own_parts:
+        return None
     if scenario is None or scenario.gain_changes or scenario.environment or scenario.feedforward:
         return None
     if scenario.law.stiffness.free:

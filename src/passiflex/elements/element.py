@@ -65,18 +65,31 @@ def nothing(n: int) -> Effect:
 
 
 class Books(NamedTuple):
-    """What a run has of an element: `NAME_energy` lost, `NAME_given_energy` at the end effector, `NAME_storage`."""
+    """What a run has of an element: `NAME_energy` lost, `NAME_given_energy` at the end effector, `NAME_storage`.
+
+    What was lost goes by its `name`, as an energy and as a power; so does what was `given`.
+    """
 
     name: str
     at_tip: bool
     stores: bool
 
     @property
+    def given(self) -> str:
+        """Return the name of what it gave to the robot."""
+        return f"{self.name}_given"
+
+    @property
+    def storage(self) -> str:
+        """Return the signal of what it stores."""
+        return f"{self.name}_storage"
+
+    @property
     def signals(self) -> tuple[str, ...]:
         """Return the signals of its balance."""
-        given = (f"{self.name}_given_energy", f"{self.name}_given_power") if self.at_tip else ()
-        stored = (f"{self.name}_storage",) if self.stores else ()
-        return (f"{self.name}_energy", f"{self.name}_power", *given, *stored)
+        flows = (self.name, self.given) if self.at_tip else (self.name,)
+        both = (f"{flow}_{kind}" for flow in flows for kind in ("energy", "power"))
+        return (*both, self.storage) if self.stores else tuple(both)
 
 
 class AbstractElement(abc.ABC):

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, field
 from types import SimpleNamespace
-from typing import Any, ClassVar, Literal, final
+from typing import ClassVar, Literal, final
 
 import casadi as cs
+import numpy as np
 from numpy.typing import ArrayLike
 
 from passiflex.elements.element import AbstractElement, Effect, Touch, nothing
@@ -24,8 +25,8 @@ class MotorFriction(AbstractElement):
     always: ClassVar[bool] = True
     unknown: ClassVar[str] = "friction of the motors"
     acts: bool = True
-    coulomb: Any = field(default=0.0, compare=False)
-    viscous: Any = field(default=0.0, compare=False)
+    coulomb: ArrayLike = field(default=0.0, compare=False)
+    viscous: ArrayLike = field(default=0.0, compare=False)
     width: float = field(default=0.01, compare=False)
     """Speed over which Coulomb friction changes its sign [rad/s]."""
 
@@ -42,8 +43,8 @@ class MotorFriction(AbstractElement):
     def numbers(self, n: int) -> Mapping[str, ArrayLike]:
         """Return its values."""
         return {
-            "coulomb_friction": _each(self.coulomb, n),
-            "viscous_friction": _each(self.viscous, n),
+            "coulomb_friction": np.broadcast_to(self.coulomb, n),
+            "viscous_friction": np.broadcast_to(self.viscous, n),
             "friction_width": self.width,
         }
 
@@ -66,7 +67,3 @@ class MotorFriction(AbstractElement):
 def friction(dtheta: cs.SX, coulomb: cs.SX, viscous: cs.SX, width: cs.SX) -> cs.SX:
     """Return the friction torque against θ̇ (n,) N m; it never gives power: each entry has the sign of θ̇."""
     return coulomb * cs.tanh(dtheta / width) + viscous * dtheta
-
-
-def _each(value: Any, n: int) -> list[float]:
-    return [float(v) for v in value] if hasattr(value, "__len__") else [float(value)] * n

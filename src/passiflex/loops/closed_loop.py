@@ -14,7 +14,8 @@ from passiflex.control.motion import MOTION, reference_at
 from passiflex.control.signals import Command, Measurement, Reference
 from passiflex.control.tank import EnergyTank
 from passiflex.layout import Field, Layout, Signal
-from passiflex.loops.plant import Elements, Plant
+from passiflex.loops.claims import claimed_energies, outer_torque, shaped_motion
+from passiflex.loops.plant import Elements, Plant, Truth
 from passiflex.loops.witness import Instant, Witness
 from passiflex.parts import Parts
 
@@ -111,9 +112,9 @@ class ClosedLoop:
         reference = reference_at(x.clock, valve, u)
 
         true = self.plant.true(state, u, plant)
-        real = {signal.field.name: signal.value for signal in true}
-        measured = self.plant.view(state)
-        measurement = Measurement(*measured, real["tau_a"] + u.torque_noise, u.F_e, real["tau_e"])
+        measurement = Measurement(
+            *self.plant.view(state), true.tau_a.value + u.torque_noise, true.wrench.value, true.tau_e.value
+        )
         command: Command = self.law.command(measurement, reference, model, gains)
         claim, has_tank = command.energy, self.law.has_tank
         tank_flow = self.tank.flow(x.tank_energy, claim.dissipated_power, claim.reference_power, tank)
@@ -131,37 +132,33 @@ class ClosedLoop:
         )
         own = {"tank_energy": tank_flow.rate if has_tank else 0, "clock": valve}
         derivative = self.state.stack(flow.rate | own)
-        claims = self._claims(reference, command, arm.potential_energy(x.q, model))
+        carried = arm.potential_energy(x.q, model)
         rates = (
             Signal(Field(f"{f.name}_power", (), "W", f"rate of {f.name}_energy"), power)
             for f, power in zip(self.energies, cs.vertsplit(powers), strict=True)
         )
-        tank_signals = (
-            Signal(Field("fill", (), "1", "α"), tank_flow.fill),
-            Signal(Field("valve", (), "1", "β"), valve),
-        )
-        return _Signals(derivative, powers, (*_in_order(true, claims), *tank_signals, *rates))
+        outputs = (*self._said(true, reference, command, carried), *_of_tank(tank_flow.fill, valve), *rates)
+        return _Signals(derivative, powers, outputs)
 
-    def _claims(self, reference: Reference, command: Command, carried: cs.SX) -> tuple[Signal, ...]:
-        """Return what the law asks for, and what it claims."""
-        n, (angle, speed, torque) = self.law.robot.n, self.law.robot.arm.chain.joint_units
-        (position, rotation), claim, across = reference.pose, command.energy, ("axis", "column")
-
-        def claimed(name: str, what: str, value: cs.SX) -> Signal:
-            return Signal(Field(name, (), "J", f"{what}, claimed by the law"), value)
-
+    def _said(
+        self, true: Truth, reference: Reference, command: Command, carried: cs.SX
+    ) -> tuple[Signal, ...]:
+        """Return what is true, what the reference does, and what the law asks for and claims."""
+        robot, (position, rotation) = self.law.robot, reference.pose
+        torque, across = robot.arm.chain.joint_units[2], ("axis", "column")
         return (
+            true.position,
+            true.rotation,
             Signal(Field("desired_position", (3,), "m", "reference x_d", axes=("axis",)), position),
             Signal(Field("desired_rotation", (3, 3), "1", "axes of the reference", axes=across), rotation),
-            Signal(Field("phi", (n,), angle, "shaped motor coordinate of (11)"), command.phi),
-            Signal(Field("dphi", (n,), speed, "its velocity"), command.dphi),
-            Signal(Field("tau_m", (n,), torque, "motor torque"), command.tau_m),
-            Signal(Field("tau_u", (n,), torque, "outer-loop torque"), command.tau_u),
-            claimed("compensated_energy", "V̂(q) of the law's model", carried),
-            claimed("shaped_kinetic_energy", "½ φ̇ᵀ B_e φ̇", claim.motor_kinetic),
-            claimed("shaped_spring_energy", "½ (φ−q)ᵀ K_e (φ−q)", claim.joint_spring),
-            claimed("cartesian_spring_energy", "U(φ; x_d)", claim.cartesian_spring),
-            claimed("gravity_storage", "of the gravity compensation", claim.gravity_storage),
+            *shaped_motion(robot, command),
+            Signal(Field("tau_m", (robot.n,), torque, "motor torque"), command.tau_m),
+            true.tau_a,
+            true.tau_e,
+            outer_torque(robot, command),
+            true.wrench,
+            *true.energies,
+            *claimed_energies(command, carried, "x_d"),
         )
 
     @cached_property
@@ -240,6 +237,5 @@ class ClosedLoop:
         return cs.Function("law", arguments, [cs.densify(command.tau_m)], {"cse": True})
 
 
-def _in_order(true: tuple[Signal, ...], claimed: tuple[Signal, ...]) -> tuple[Signal, ...]:
-    """Return the signals in the order in which files have them: the reference beside the end effector."""
-    return (*true[:2], *claimed[:5], *true[2:4], claimed[5], *true[4:], *claimed[6:])
+def _of_tank(fill: cs.SX, valve: cs.SX) -> tuple[Signal, ...]:
+    return Signal(Field("fill", (), "1", "α"), fill), Signal(Field("valve", (), "1", "β"), valve)

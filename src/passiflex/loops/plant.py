@@ -39,6 +39,23 @@ class Flow(NamedTuple):
     powers: dict[str, cs.SX]
 
 
+class Truth(NamedTuple):
+    """What is true at one instant; `energies` are what robot and elements store."""
+
+    position: Signal
+    rotation: Signal
+    tau_a: Signal
+    tau_e: Signal
+    wrench: Signal
+    energies: tuple[Signal, ...]
+
+    @property
+    def signals(self) -> tuple[Signal, ...]:
+        """Return all of them, in the order of files."""
+        *single, energies = self
+        return (*single, *energies)
+
+
 @dataclass(frozen=True, eq=False)
 class Plant:
     """ẋ = f(x, [τ_m, environment], p) for x = (q, θ, q̇, θ̇, states of elements), with what passes its ports.
@@ -75,9 +92,7 @@ class Plant:
     def energies(self) -> Layout:
         """Return what is summed up over time."""
         lost = tuple(Field(e.name, (), "J", e.meaning) for e in self.booked)
-        given = tuple(
-            Field(f"{e.name}_given", (), "J", "given to the robot") for e in self.booked if e.at_tip
-        )
+        given = tuple(Field(e.books.given, (), "J", "given to the robot") for e in self.booked if e.at_tip)
         return Layout(PORTS + lost + given)
 
     @cached_property
@@ -122,7 +137,7 @@ class Plant:
         for element, effect in zip(self.elements, effects, strict=True):
             if element in self.booked:
                 powers[element.name] = effect.lost
-                powers[f"{element.name}_given"] = given_by(effect, at)
+                powers[element.books.given] = given_by(effect, at)
             rate |= vars(element.state(self.robot.n).view(effect.rate))
         return Flow(rate, {f.name: powers[f.name] for f in self.energies})
 
@@ -151,34 +166,48 @@ class Plant:
         )
         return s.F_e + cs.vertcat(*parts)
 
-    def true(self, x: cs.SX, s: SimpleNamespace, m: SimpleNamespace) -> tuple[Signal, ...]:
+    def true(self, x: cs.SX, s: SimpleNamespace, m: SimpleNamespace) -> Truth:
         """Return what is true at one instant."""
         arm, robot, n = self.robot.arm, self.view(x), self.robot.n
-        torque, energy = arm.chain.joint_units[2], (lambda name, text: Field(name, (), "J", text))
+        torque, across = arm.chain.joint_units[2], ("axis", "column")
         effects = self._effects(self._touch(x, m), x, s, m)
         wrench, pose = self._world_wrench(_sum(effects, n), x, s), arm.pose(robot.q, m)
         tau_a, tau_e = self.robot.joint_torque(robot, m), arm.jacobian(robot.q, m).T @ wrench
-        stretch, M = robot.theta - robot.q, arm.mass_matrix(robot.q, m)
-        kinetic = cs.dot(robot.dq, M @ robot.dq) / 2
-        turning = cs.dot(robot.dtheta, m.motor_inertia * robot.dtheta) / 2
-        spring = cs.dot(stretch, m.joint_stiffness * stretch) / 2
-        across = ("axis", "column")
-        stored = (
-            Signal(energy(f"{e.name}_storage", "stored in it"), f.stored)
-            for e, f in zip(self.elements, effects, strict=True)
-            if e.stores and e in self.booked
+        return Truth(
+            position=Signal(Field("position", (3,), "m", "end effector", axes=("axis",)), pose.position),
+            rotation=Signal(
+                Field("rotation", (3, 3), "1", "axes of the end effector", axes=across), pose.rotation
+            ),
+            tau_a=Signal(
+                Field("tau_a", (n,), torque, "torque through the joint, positive on the link"), tau_a
+            ),
+            tau_e=Signal(Field("tau_e", (n,), torque, "external joint torque"), tau_e),
+            wrench=Signal(
+                Field("wrench", (6,), "N, N m", "all on the end effector", axes=("component",)), wrench
+            ),
+            energies=self._energies(robot, effects, m),
         )
+
+    def _energies(self, x: RobotState, effects: list[Effect], m: SimpleNamespace) -> tuple[Signal, ...]:
+        """Return what robot and elements store."""
+        arm, stretch = self.robot.arm, x.theta - x.q
+
+        def stored(name: str, what: str, value: cs.SX) -> Signal:
+            return Signal(Field(name, (), "J", what), value)
+
+        touching = zip(self.elements, effects, strict=True)
         return (
-            Signal(Field("position", (3,), "m", "end effector", axes=("axis",)), pose.position),
-            Signal(Field("rotation", (3, 3), "1", "axes of the end effector", axes=across), pose.rotation),
-            Signal(Field("tau_a", (n,), torque, "torque through the joint, positive on the link"), tau_a),
-            Signal(Field("tau_e", (n,), torque, "external joint torque"), tau_e),
-            Signal(Field("wrench", (6,), "N, N m", "all on the end effector", axes=("component",)), wrench),
-            Signal(energy("link_kinetic_energy", "½ q̇ᵀ M q̇"), kinetic),
-            Signal(energy("motor_kinetic_energy", "½ θ̇ᵀ B θ̇"), turning),
-            Signal(energy("joint_spring_energy", "½ (θ−q)ᵀ K (θ−q)"), spring),
-            Signal(energy("potential_energy", "V(q)"), arm.potential_energy(robot.q, m)),
-            *stored,
+            stored("link_kinetic_energy", "½ q̇ᵀ M q̇", cs.dot(x.dq, arm.mass_matrix(x.q, m) @ x.dq) / 2),
+            stored("motor_kinetic_energy", "½ θ̇ᵀ B θ̇", cs.dot(x.dtheta, m.motor_inertia * x.dtheta) / 2),
+            stored(
+                "joint_spring_energy", "½ (θ−q)ᵀ K (θ−q)", cs.dot(stretch, m.joint_stiffness * stretch) / 2
+            ),
+            stored("potential_energy", "V(q)", arm.potential_energy(x.q, m)),
+            *(
+                stored(e.books.storage, "stored in it", f.stored)
+                for e, f in touching
+                if e.stores and e in self.booked
+            ),
         )
 
     @cached_property

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from passiflex.control.signals import Measurement
 from passiflex.layout import Field, Layout, Signal
+from passiflex.loops.claims import claimed_energies, outer_torque, shaped_motion
 from passiflex.loops.period_row import PeriodRow
 from passiflex.loops.plant import ELEMENTS, Elements, Plant
 from passiflex.loops.witness import LARGEST, Instant, Witness
@@ -152,13 +153,9 @@ class SampledLoop:
         """Return what is recorded of a period."""
         robot, command, entry = self.controller.law.robot, result.command, result.entry
         n, (angle, speed, torque) = robot.n, robot.arm.chain.joint_units
-        claim = command.energy
 
         def read(name: str, unit: str, symbol: str, value: cs.SX) -> Signal:
             return Signal(Field(f"measured_{name}", (n,), unit, f"{symbol} as the sensors have it"), value)
-
-        def claimed(name: str, what: str, value: cs.SX) -> Signal:
-            return Signal(Field(name, (), "J", f"{what}, claimed by the law"), value)
 
         believed = result.believed.tau_e
         return (
@@ -169,14 +166,9 @@ class SampledLoop:
             read("tau_a", torque, "τ_a", y.tau_a),
             Signal(Field("believed_tau_e", (n,), torque, "τ_e as the law believes it"), believed),
             Signal(Field("commanded_torque", (n,), torque, "τ_m before the motors' limits"), command.tau_m),
-            Signal(Field("tau_u", (n,), torque, "outer-loop torque"), command.tau_u),
-            Signal(Field("phi", (n,), angle, "shaped motor coordinate of (11)"), command.phi),
-            Signal(Field("dphi", (n,), speed, "its velocity"), command.dphi),
-            claimed("compensated_energy", "V̂(q) of the law's model", carried),
-            claimed("shaped_kinetic_energy", "½ φ̇ᵀ B_e φ̇", claim.motor_kinetic),
-            claimed("shaped_spring_energy", "½ (φ−q)ᵀ K_e (φ−q)", claim.joint_spring),
-            claimed("cartesian_spring_energy", "U(φ; x̂_d)", claim.cartesian_spring),
-            claimed("gravity_storage", "of the gravity compensation", claim.gravity_storage),
+            outer_torque(robot, command),
+            *shaped_motion(robot, command),
+            *claimed_energies(command, carried, "x̂_d"),
             Signal(Field("reference_share", (), "1", "γ of the reference"), entry.reference_share),
             Signal(Field("stiffness_share", (), "1", "γ of the stiffness"), entry.stiffness_share),
             Signal(Field("valve", (), "1", "β"), entry.valve),
@@ -200,7 +192,7 @@ class SampledLoop:
         powers = self.plant.flow(state, command, s, views["plant"]).powers.items()
         rates = (Signal(Field(f"{f}_power", (), "W", f"rate of {f}_energy"), power) for f, power in powers)
         signals = (
-            *self.plant.true(state, s, views["plant"]),
+            *self.plant.true(state, s, views["plant"]).signals,
             Signal(carried, robot.arm.potential_energy(x.q, views["model"])),
             *rates,
         )

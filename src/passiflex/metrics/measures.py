@@ -12,7 +12,7 @@ from passiflex.control.gain_design import target_inertia
 from passiflex.metrics.closed_form import ideal_displacement
 from passiflex.metrics.numbers import rms
 from passiflex.metrics.steps import StepWindow, displacement, step_numbers
-from passiflex.passivity import audit
+from passiflex.passivity import Audit, audit
 from passiflex.passivity.ledger import Signals
 from passiflex.problems.problem import Problem, SampledProblem
 
@@ -88,9 +88,14 @@ SIGNALS = (
 """What is recorded of a sampled run for it."""
 
 
-def measures(problem: Problem, window: StepWindow | None, run: Signals) -> dict[str, float | str]:
-    """Return verdict, what decided it, why the run failed, and the numbers of `MEASURES`."""
-    result, robot, end = audit(run), problem.law.robot, run.time[-1]
+def measures(
+    problem: Problem, window: StepWindow | None, run: Signals, audited: Audit | None = None
+) -> dict[str, float | str]:
+    """Return verdict, what decided it, why the run failed, and the numbers of `MEASURES`.
+
+    `audited` is the run's audit, if it has been made already.
+    """
+    result, robot, end = audited or audit(run), problem.law.robot, run.time[-1]
     torque = _reached(run, "highest_torque", np.abs(run["tau_m"]).max(axis=0))
     speed = _reached(run, "highest_speed", np.abs(run["dq"]).max(axis=0))
     lowest, highest = (

@@ -105,7 +105,7 @@ def robot_balance(run: Signals) -> Balance:
             "motors": run["motor_kinetic_energy"],
             "joint springs": run["joint_spring_energy"],
             "gravity": run["potential_energy"],
-            **{e.name: run[f"{e.name}_storage"] for e in own if e.stores},
+            **{e.name: run[e.storage] for e in own if e.stores},
         },
         {"environment": "external", "motor torque": "motor"},
         {"joint dampers": "joint_loss"} | {f"motor {e.name}": e.name for e in own},
@@ -117,15 +117,15 @@ def environment_balance(run: Signals) -> Balance:
 
     Pushes of the scenario are no part of it: they give whatever they are told to.
     """
-    there = [e.name for e in run.elements if e.at_tip]
-    stored = {e.name: run[f"{e.name}_storage"] for e in run.elements if e.at_tip and e.stores}
+    there = [e for e in run.elements if e.at_tip]
+    stored = {e.name: run[e.storage] for e in there if e.stores}
     return Balance(
         "environment",
         stored or {"nothing stored": np.zeros_like(run["external_energy"])},
-        {f"{name}, from the robot": -run[f"{name}_given_energy"] for name in there},
-        {f"{name}, lost": run[f"{name}_energy"] for name in there},
-        {f"{name}, from the robot": -run[f"{name}_given_power"] for name in there},
-        {f"{name}, lost": run[f"{name}_power"] for name in there},
+        {f"{e.name}, from the robot": -run[f"{e.given}_energy"] for e in there},
+        {f"{e.name}, lost": run[f"{e.name}_energy"] for e in there},
+        {f"{e.name}, from the robot": -run[f"{e.given}_power"] for e in there},
+        {f"{e.name}, lost": run[f"{e.name}_power"] for e in there},
     )
 
 

@@ -13,13 +13,18 @@ from numpy.typing import ArrayLike
 from passiflex.control.law import AbstractLaw
 from passiflex.elements import AbstractElement, Effect, Touch
 from passiflex.errors import ArgumentError, ValueRangeError
+from passiflex.loops.closed_loop import ClosedLoop
 from passiflex.loops.plant import Plant
+from passiflex.loops.recorded import instant_parts, sample_parts
 from passiflex.problems.problem import Problem, SampledProblem
 from passiflex.problems.timeline import with_motions
 from passiflex.robots.flexible import RobotState
 from passiflex.sampled.sensors import AbstractSensorEffect
 from passiflex.sampled.tank import AbstractTank
 from passiflex.scenarios.reference import AbstractReferenceEvent
+
+OWN = "# With parts that no scenario has: "
+"""How the text of a problem with such parts begins: it cannot be made again from that alone."""
 
 
 def with_parts(
@@ -47,7 +52,7 @@ def with_parts(
     ------
     ValueRangeError
         For another robot's law, or one in a matched loop, an element with inputs or more than one port, two of one
-        name, a tank or sensors in continuous time, or a motion beyond the run.
+        name or with a signal's, a tank or sensors in continuous time, or a motion beyond the run.
     ArgumentError
         For what is no such part, as its class.
     NameUnknownError, SizeError
@@ -64,6 +69,7 @@ def with_parts(
     for part, kind in kinds:
         if not isinstance(part, kind | None):
             raise ArgumentError(part, f"an instance of {kind.__name__}, from a class of your own")
+        _require_hash(part)
     changed = problem
     if law is not None:
         changed = _with_law(changed, law, dict(gains or {}))
@@ -80,8 +86,27 @@ def with_parts(
     own = [part for part in (law, tank, *elements, *sensors, *reference) if part is not None]
     if not own:
         return problem
-    said = f"# With parts that no scenario has: {', '.join(type(part).__name__ for part in own)}.\n"
+    if isinstance(changed, SampledProblem):
+        sample_parts(changed.loop)
+    else:
+        instant_parts(ClosedLoop(changed.law, changed.elements))
+    said = f"{OWN}{', '.join(type(part).__name__ for part in own)}.\n"
     return dataclasses.replace(changed, text=said + problem.text)
+
+
+def parts_said(text: str) -> str:
+    """Return the parts of somebody's own that the text of a problem names."""
+    first = text.partition("\n")[0]
+    return first.removeprefix(OWN).removesuffix(".") if first.startswith(OWN) else ""
+
+
+def _require_hash(part: object) -> None:
+    """Raise ArgumentError for a part whose code could not be found again: it is kept by what the part is."""
+    try:
+        hash(part)
+    except TypeError:
+        needs = "a class that can be hashed, with numbers or tuples as attributes"
+        raise ArgumentError(part, needs, "@dataclass(frozen=True)") from None
 
 
 def _with_law(problem: Problem, law: AbstractLaw, gains: dict[str, Any]) -> Problem:
@@ -140,9 +165,7 @@ def _with_elements(problem: Problem, elements: tuple[AbstractElement, ...]) -> P
 def _with_sensors(problem: Problem, effects: tuple[AbstractSensorEffect, ...]) -> Problem:
     if not isinstance(problem, SampledProblem):
         raise ValueRangeError("sensors of one's own are for sampled loops", needs="a scenario with `control`")
-    changed = dataclasses.replace(problem, effects=(*problem.effects, *effects))
-    _ = changed.loop.memory  # which refuses two fields of one name
-    return changed
+    return dataclasses.replace(problem, effects=(*problem.effects, *effects))
 
 
 def _with_reference(problem: Problem, events: Sequence[AbstractReferenceEvent]) -> Problem:

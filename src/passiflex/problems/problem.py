@@ -108,7 +108,7 @@ class Problem:
     seed: int
     text: str
 
-    @property
+    @cached_property
     def parts(self) -> Parts:
         """Return whose the numbers are."""
         return ClosedLoop(self.law, self.elements).parameters
@@ -165,7 +165,7 @@ class SampledProblem(Problem):
         """Return the loop that runs."""
         return SampledLoop(self.controller, self.elements, self.effects)
 
-    @property
+    @cached_property
     def parts(self) -> Parts:
         """Return whose the numbers are."""
         return self.loop.parameters

@@ -34,7 +34,9 @@ def content(run: Run, others: Sequence[Run | Viewed] = (), notices: Sequence[str
     """Return what a page says of a run beside others."""
     main, *compared = labelled(run, others)
     arrays, said = Arrays(), list(notices)
-    chain, result = chain_of(run), audit_if_possible(run)
+    runs = [run, *(v.run for v in compared)]
+    chain, audits = chain_of(run), [audit_if_possible(each) for each in runs]
+    result = audits[0]
     said += [NO_ARM] if chain is None else []
     said += [NO_VERDICT] if result is None else []
     ghosts = ghosts_header(main, compared, roles_of(main, compared)[1:], chain, arrays)
@@ -50,9 +52,7 @@ def content(run: Run, others: Sequence[Run | Viewed] = (), notices: Sequence[str
         "notices": said,
         "facts": facts(run, run.scenario),
         "verdict": verdict,
-        "metrics": metrics_header(
-            [run, *(v.run for v in compared)], [main.label, *(v.label for v in compared)]
-        ),
+        "metrics": metrics_header(runs, audits, [main.label, *(v.label for v in compared)]),
         "configuration": shown_configuration(run),
         "marks": marks_header(marks_of(run)),
         "spans": spans_header(spans_of(run)),

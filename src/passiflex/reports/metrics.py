@@ -10,7 +10,7 @@ from passiflex.errors import PassiflexError
 from passiflex.loops.witness import ROUND_OFF
 from passiflex.metrics.measures import MEASURES, measures
 from passiflex.metrics.steps import step_window
-from passiflex.passivity import Audit, audit_if_possible
+from passiflex.passivity import Audit
 from passiflex.runs.run_arm import problem_of
 from passiflex.simulation import Run
 
@@ -60,9 +60,11 @@ def _joules(energy: float) -> str:
     return f"{energy:.4g} J" if abs(energy) > ROUND_OFF else "0 J"
 
 
-def metrics_header(runs: Sequence[Run], labels: Sequence[str]) -> dict[str, Any]:
+def metrics_header(
+    runs: Sequence[Run], audits: Sequence[Audit | None], labels: Sequence[str]
+) -> dict[str, Any]:
     """Return one row for each measure that any of the runs has; what is not there is null."""
-    columns = [_measured(run) for run in runs]
+    columns = [_measured(run, result) for run, result in zip(runs, audits, strict=True)]
     rows = []
     for name in (*WORDS, *MEASURES):
         values = [_shown(column.get(name, math.nan)) for column in columns]
@@ -74,9 +76,11 @@ def metrics_header(runs: Sequence[Run], labels: Sequence[str]) -> dict[str, Any]
     return {"columns": list(labels), "rows": rows}
 
 
-def _measured(run: Run) -> dict[str, float | str]:
-    """Return all measures; of a run that does not fit a robot of today, what its audit says."""
-    result = audit_if_possible(run)
+def _measured(run: Run, result: Audit | None) -> dict[str, float | str]:
+    """Return all measures; of a run that does not fit a robot of today, what its audit says.
+
+    Where somebody's own part took part, no ideal and no step of the scenario is what it is to be held against.
+    """
     if result is None:
         return {"end_time": float(run.time[-1])}
     scenario = run.scenario
@@ -87,7 +91,8 @@ def _measured(run: Run) -> dict[str, float | str]:
             and problem is not None
             and problem.law.robot.n == run.data.sizes.get("joint")
         ):
-            return measures(problem, step_window(scenario), run)
+            window = None if run.own_parts else step_window(scenario)
+            return measures(problem, window, run, result)
     except (PassiflexError, KeyError):  # the robot's file is gone, or a signal is missing
         pass
     return {

@@ -19,6 +19,8 @@ from passiflex.layout import Layout
 from passiflex.loops.plant import Plant
 from passiflex.loops.witness import Noted
 from passiflex.origin import package_version, source_commit
+from passiflex.problems.own_parts import parts_said
+from passiflex.problems.problem import SampledProblem
 from passiflex.problems.unbooked import UNKNOWN, unbooked
 from passiflex.runs.run_attributes import renamed, wrong_attributes, wrong_units
 from passiflex.runs.run_bounds import require_bounded
@@ -60,6 +62,11 @@ class Run:
     def scenario(self) -> Scenario | None:
         """Return the scenario that it was made from; None where the run carries none that can be read."""
         return scenario_of_text(str(self.data.attrs.get("scenario", "")))
+
+    @property
+    def own_parts(self) -> str:
+        """Return the parts that no scenario has, by their classes; empty for most runs."""
+        return parts_said(str(self.data.attrs.get("scenario", "")))
 
     @property
     def sampled(self) -> bool:
@@ -174,11 +181,10 @@ Run.__setattr__ = Run.__delattr__ = _refuse_change  # type: ignore[assignment,me
 
 
 class Recorded(NamedTuple):
-    """Recorded rows: what each column is, the numbers (N, size), and a suffix for the names."""
+    """Recorded rows: what each column is, and the numbers (N, size)."""
 
     layout: Layout
     numbers: NDArray[np.float64]
-    suffix: str = ""
 
 
 def assemble(
@@ -191,10 +197,10 @@ def assemble(
 ) -> Run:
     """Return the run of recorded rows, and of what was noted at every step."""
     variables: dict[str, Any] = {}
-    for layout, numbers, suffix in recorded:
+    for layout, numbers in recorded:
         values = layout.unpack(numbers)
         for f in layout:
-            variables[f.name + suffix] = (
+            variables[f.name] = (
                 ("time", *f.dims), values[f.name], {"units": f.unit, "long_name": f.meaning},
             )  # fmt: skip
     for f in noted.layout:
@@ -226,7 +232,7 @@ def assemble(
         "unbooked": unbooked(problem),
         "elements": json.dumps([e.books for e in Plant(robot, problem.elements).booked]),
         "has_tank": int(problem.law.has_tank),
-        "control_period": getattr(problem, "period", 0.0),
+        "control_period": problem.period if isinstance(problem, SampledProblem) else 0.0,
         "version": package_version(),
         "commit": source_commit(),
         "events": json.dumps(events),

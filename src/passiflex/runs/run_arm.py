@@ -89,11 +89,17 @@ def _candidates(run: Run) -> Iterator[SerialChain]:
     name, text = str(run.data.attrs.get("robot", "")), str(run.data.attrs.get("robot_description", ""))
     if "<" in text and "<!" not in text:  # anything else would be a path, or is none of ours
         with suppress(PassiflexError, ValueError, RecursionError):  # the catalogue may know the robot
-            yield replace(read_chain(text).chain, name=name or "arm")
+            yield replace(_described(text), name=name or "arm")
     settings = _settings(str(run.data.attrs.get("scenario", "")))
     if settings is not None:
         robot, tool = settings
         yield read_description(robot).chain.with_tool(tool.position, tool.rotation_vector)
+
+
+@lru_cache(maxsize=8)
+def _described(text: str) -> SerialChain:
+    """Return the arm of a description, which is asked for again and again."""
+    return read_chain(text).chain
 
 
 @lru_cache(maxsize=8)

@@ -21,6 +21,10 @@ NOTED = {
     for f in Witness(JointExtremes(1, "", "", "", motors=True), has_tank=True, sampled=True).extremes
 }
 """What was noted at every step, and its axes."""
+USUAL: tuple[Dims, ...] = (
+    ("time",), ("time", "joint"), ("joint",), ("time", "axis"), ("time", "axis", "column"), ("time", "component"),
+)  # fmt: skip
+"""Axes that a signal may have which nobody here knows, as the state of somebody's element."""
 LARGEST = 1e30
 """No quantity of a robot is larger, in SI units; squares of it are still finite. Energies, which only add, may be."""
 
@@ -53,7 +57,7 @@ def _possible(name: str) -> tuple[Dims, ...]:
         return (NOTED[name],)
     if name in OF_ROBOT:
         return (("joint",),)
-    return (("time",),) if name.endswith(OF_TIME) else (("time",), ("time", "joint"), ("joint",))
+    return (("time",),) if name.endswith(OF_TIME) else USUAL
 
 
 def _bounded(name: str, values: xr.DataArray) -> xr.DataArray:

@@ -13,6 +13,7 @@ from passiflex.control.tank import jump_cost
 from passiflex.errors import SimulationError
 from passiflex.loops.closed_loop import ClosedLoop
 from passiflex.loops.compiled import CompiledLoop, compiled_loop
+from passiflex.loops.recorded import instant_parts
 from passiflex.native import Watched, fastest_pole
 from passiflex.native.stability import STABILITY_LIMIT
 from passiflex.problems.problem import Event, Problem, SampledProblem
@@ -136,11 +137,8 @@ class _Simulation:
             self.compiled.outputs.map(states, record.inputs[:good], self.p), dtype=float
         )
         loop = self.compiled.loop
-        recorded = [
-            Recorded(loop.state, states),
-            Recorded(loop.energies, energies, "_energy"),
-            Recorded(loop.output_layout, outputs),
-        ]
+        parts = zip(instant_parts(loop), (states, energies, outputs), strict=True)
+        recorded = [Recorded(layout, numbers) for layout, numbers in parts]
         noted = loop.witness.noted(self.watched.memory)
         return assemble(problem, record.time[:good], recorded, self.log, failure, noted)
 
@@ -186,7 +184,8 @@ class _Simulation:
             rhs, tolerance = self.compiled.rhs, problem.tolerance
             return smooth_stretch(rhs, self.x, u, self.p, instants, tolerance, stepper, begun)
 
-        if pole <= SLOW_POLE:
+        touched = any(element.acts for element in problem.elements)  # dry friction has its own, shorter times
+        if pole <= SLOW_POLE and not touched:
             apart = share * STABILITY_LIMIT / max(pole, 1 / problem.duration)
             return self._looked_at(resolved, after, begun, apart)
         stretch = self._looked_at(smooth, after, begun, CHECK)

@@ -116,7 +116,7 @@ def readable(model: Model) -> dict[str, FieldInfo]:
 
 def former_names(model: Model) -> dict[str, str]:
     """Return former name → name of the entries of a model that had another."""
-    return getattr(model, "former_names", dict[str, str])()  # of a `Section`
+    return model.former_names() if hasattr(model, "former_names") else {}  # as a `Section` has
 
 
 def models(annotation: Any) -> Iterator[Model]:
