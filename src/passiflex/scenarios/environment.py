@@ -38,6 +38,10 @@ class Drag(TimeSpan):
         return {"viscous_drag": self.viscous, "dry_drag": self.dry}
 
 
+Touching = Drag
+"""What an entry of `environment` may be."""
+
+
 def as_drags(written: Any) -> Any:
     """Return entries of `drags`, as `environment` was called when there was nothing else, with their kind."""
     if not isinstance(written, list | tuple):

@@ -180,3 +180,7 @@ class RigidSettings(AbstractLawSettings):
         damping = self.damping.full() if ratio is None else damping_from_ratio(world, inertia, ratio)
         carried = model["motor_inertia"] if self.motor_inertia == "carried" else np.zeros(law.robot.n)
         return own | {"target_inertia": inertia, "damping": damping, "carried_inertia": carried}
+
+
+LawSettings = Annotated[ImpedanceSettings | RigidSettings, Field(discriminator="type")]
+"""What `law` may be."""

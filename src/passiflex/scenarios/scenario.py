@@ -17,8 +17,8 @@ from passiflex.scenarios.control_settings import (
     change_mistakes,
     gain_mistakes,
 )
-from passiflex.scenarios.environment import Drag, as_drags
-from passiflex.scenarios.law_settings import ImpedanceSettings, RigidSettings
+from passiflex.scenarios.environment import Touching, as_drags
+from passiflex.scenarios.law_settings import LawSettings
 from passiflex.scenarios.model_errors import Deviations, ModelErrors
 from passiflex.scenarios.noise_settings import Noise
 from passiflex.scenarios.reference import ZERO, Length, ReferenceEvent, Turn
@@ -78,9 +78,7 @@ class Scenario(Section):
     posture: Annotated[Vector, Quantity("rad", ((None,),))] = Field(
         description="joint angles at the start, at rest, rad"
     )
-    law: Annotated[ImpedanceSettings | RigidSettings, Field(discriminator="type")] = Field(
-        description="control law"
-    )
+    law: LawSettings = Field(description="control law")
     control: Control | None = Field(
         default=None, description="a controller that samples; continuous time if left out"
     )
@@ -113,7 +111,7 @@ class Scenario(Section):
     feedforward: tuple[Feedforward, ...] = Field(
         default=(), description="wrenches that the end effector is to exert, with control only"
     )
-    environment: tuple[Drag, ...] = Field(
+    environment: tuple[Touching, ...] = Field(
         default=(),
         validation_alias=AliasChoices("environment", "drags"),
         description="what touches the end effector",
