@@ -52,7 +52,7 @@ def content(run: Run, others: Sequence[Run | Viewed] = (), notices: Sequence[str
         "notices": said,
         "facts": facts(run, run.scenario),
         "verdict": verdict,
-        "metrics": metrics_header(runs, audits, [main.label, *(v.label for v in compared)]),
+        "metrics": metrics_header(runs, [main.label, *(v.label for v in compared)], audits),
         "configuration": shown_configuration(run),
         "marks": marks_header(marks_of(run)),
         "spans": spans_header(spans_of(run)),

@@ -10,7 +10,7 @@ from passiflex.errors import PassiflexError
 from passiflex.loops.witness import ROUND_OFF
 from passiflex.metrics.measures import MEASURES, measures
 from passiflex.metrics.steps import step_window
-from passiflex.passivity import Audit
+from passiflex.passivity import Audit, audit_if_possible
 from passiflex.runs.run_arm import problem_of
 from passiflex.simulation import Run
 
@@ -61,10 +61,14 @@ def _joules(energy: float) -> str:
 
 
 def metrics_header(
-    runs: Sequence[Run], audits: Sequence[Audit | None], labels: Sequence[str]
+    runs: Sequence[Run], labels: Sequence[str], audits: Sequence[Audit | None] | None = None
 ) -> dict[str, Any]:
-    """Return one row for each measure that any of the runs has; what is not there is null."""
-    columns = [_measured(run, result) for run, result in zip(runs, audits, strict=True)]
+    """Return one row for each measure that any of the runs has; what is not there is null.
+
+    `audits` are those of the runs, if they have been made already.
+    """
+    made = [audit_if_possible(run) for run in runs] if audits is None else audits
+    columns = [_measured(run, result) for run, result in zip(runs, made, strict=True)]
     rows = []
     for name in (*WORDS, *MEASURES):
         values = [_shown(column.get(name, math.nan)) for column in columns]
