@@ -29,7 +29,7 @@ from rich.table import Table
 
 import plain
 from passiflex.control.motion import MOTION
-from passiflex.native import DRIVER, NativeFunction, compile_functions, find_compiler, library
+from passiflex.native import DRIVER, NativeFunction, find_compiler, library
 from passiflex.simulation import (
     ClosedLoop,
     CompiledLoop,
@@ -176,8 +176,7 @@ def field_rows(
 
 
 def law_row(loop: CompiledLoop, problem: Problem, repeats: int, rng: np.random.Generator) -> tuple[Row, str]:
-    alone, n = loop.loop.law_function, problem.law.robot.n
-    law = NativeFunction(alone, compile_functions([alone]))
+    law, n = loop.law, problem.law.robot.n
     fresh = rng.normal(0, 1e-3, n)
     q, theta, *_ = law.inputs
     motion = problem.events[0].motion

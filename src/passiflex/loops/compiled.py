@@ -43,12 +43,14 @@ class CompiledLoop:
     rhs: (x, u, p) → (ẋ, powers), as a CasADi function for CVODES.
     fixed_step: The same, under held inputs.
     outputs: (x, u, p) → recorded signals.
+    law: The control law alone.
     """
 
     loop: ClosedLoop
     rhs: cs.Function
     fixed_step: FixedStep
     outputs: NativeFunction
+    law: NativeFunction
 
 
 def compiled_loop(loop: ClosedLoop) -> CompiledLoop:
@@ -128,10 +130,11 @@ def _urdf(arm: SerialArm) -> str:
 
 
 def _compile(loop: ClosedLoop) -> CompiledLoop:
-    library = compile_functions([loop.rhs, loop.outputs, loop.watch], driver=DRIVER)
+    library = compile_functions([loop.rhs, loop.outputs, loop.watch, loop.law_function], driver=DRIVER)
     return CompiledLoop(
         loop=loop,
         rhs=load_external("rhs", library, **CVODES_DERIVATIVES) if library else loop.rhs,
         fixed_step=FixedStep(loop.rhs, library, loop.watch),
         outputs=NativeFunction(loop.outputs, library),
+        law=NativeFunction(loop.law_function, library),
     )
