@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Protocol
+
 import casadi as cs
 import numpy as np
 import pytest
@@ -146,3 +148,20 @@ def test_every_mistake_is_named(
     with pytest.raises(kind) as error:
         LAYOUT.pack(values)
     assert str(error.value) == message
+
+
+class Mass(Protocol):
+    mass: cs.SX
+
+
+class MassAndForce(Mass, Protocol):
+    force: cs.SX
+
+
+def test_a_layout_has_the_names_that_its_protocol_promises_and_no_others() -> None:
+    both = (Field("mass", (), "kg"), Field("force", (3,), "N"))
+    view: MassAndForce = Layout(both, MassAndForce).symbols("p")[1]
+    assert view.force.numel() == 3
+    for fields, promised, other in ((both, Mass, "force"), (both[:1], MassAndForce, "force")):
+        with pytest.raises(ValueRangeError, match=other):
+            Layout(fields, promised)

@@ -9,7 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from dataclasses import field as dataclass_field
 from functools import cached_property
+from inspect import get_annotations
 from math import prod
 from types import SimpleNamespace
 from typing import Any, NamedTuple
@@ -59,16 +61,31 @@ class Signal(NamedTuple):
 
 @dataclass(frozen=True)
 class Layout:
-    """An ordered set of fields in one flat vector."""
+    """An ordered set of fields in one flat vector.
+
+    Attributes
+    ----------
+    numbers: A protocol with an attribute for each field: what those who view the vector say that they have, so
+        that a type checker knows the names.
+    """
 
     fields: tuple[Field, ...]
+    numbers: type | None = dataclass_field(default=None, compare=False)
 
     def __post_init__(self) -> None:
-        """Refuse two fields of one name."""
+        """Refuse two fields of one name, and a protocol of other names."""
         names = [f.name for f in self.fields]
         if len(set(names)) < len(names):
             twice = sorted({name for name in names if names.count(name) > 1})
             raise ValueRangeError("a layout has two fields of one name", got=", ".join(twice))
+        if self.numbers is not None:
+            promised = set().union(*(get_annotations(c) for c in self.numbers.__mro__))
+            if promised != set(names):
+                raise ValueRangeError(
+                    f"a layout is not what {self.numbers.__name__} says",
+                    got=", ".join(sorted(promised ^ set(names))),
+                    needs="the same names in both",
+                )
 
     @classmethod
     def of(cls, signals: Iterable[Signal]) -> Layout:
@@ -108,13 +125,13 @@ class Layout:
         """Return zeros by name."""
         return {f.name: np.zeros(f.shape) for f in self.fields}
 
-    def symbols(self, name: str) -> tuple[cs.SX, SimpleNamespace]:
+    def symbols(self, name: str) -> tuple[cs.SX, Any]:
         """Return a fresh symbolic vector and its named views."""
         vector = cs.SX.sym(name, self.size)
         return vector, self.view(vector)
 
-    def view(self, vector: cs.SX) -> SimpleNamespace:
-        """Return named symbolic views of `vector`, matrices in shape."""
+    def view(self, vector: cs.SX) -> Any:
+        """Return named symbolic views of `vector`, matrices in shape; whoever takes them says which, by `numbers`."""
         out = {}
         for f in self.fields:
             part = vector[self.slices[f.name]]

@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import accumulate, pairwise
-from types import SimpleNamespace
 from typing import Any
 
 import casadi as cs
@@ -38,7 +37,7 @@ class Parts:
         ends = list(accumulate(layout.size for layout in self.layouts.values()))
         return {part: slice(*ab) for part, ab in zip(self.layouts, pairwise([0, *ends]), strict=True)}
 
-    def view(self, p: cs.SX) -> dict[str, SimpleNamespace]:
+    def view(self, p: cs.SX) -> dict[str, Any]:
         """Return named symbolic views of each part."""
         return {part: layout.view(p[self.slices[part]]) for part, layout in self.layouts.items()}
 

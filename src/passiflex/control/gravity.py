@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import abc
 from dataclasses import dataclass
-from types import SimpleNamespace
 from typing import ClassVar
 
 import casadi as cs
 
 from passiflex.control.signals import Contribution
-from passiflex.robots.arm import SerialArm
+from passiflex.robots.arm import ArmNumbers, SerialArm
 
 
 class AbstractGravity(abc.ABC):
@@ -21,7 +20,7 @@ class AbstractGravity(abc.ABC):
     """Whether it finds where the links rest by a fixed point, which a soft K_e lets contract too slowly."""
 
     @abc.abstractmethod
-    def compensation(self, arm: SerialArm, phi: cs.SX, K_e: cs.SX, m: SimpleNamespace) -> Contribution:
+    def compensation(self, arm: SerialArm, phi: cs.SX, K_e: cs.SX, m: ArmNumbers) -> Contribution:
         """Return torque and storage at φ (n,), with the shaped stiffness K_e (n,) and the law's model m."""
 
 
@@ -31,7 +30,7 @@ class RobotGravity(AbstractGravity):
 
     in_model: ClassVar[bool] = False
 
-    def compensation(self, arm: SerialArm, phi: cs.SX, K_e: cs.SX, m: SimpleNamespace) -> Contribution:
+    def compensation(self, arm: SerialArm, phi: cs.SX, K_e: cs.SX, m: ArmNumbers) -> Contribution:
         """Return zero and zero."""
         return Contribution(cs.SX.zeros(arm.n), cs.SX(0), cs.SX(0))
 
@@ -42,7 +41,7 @@ class MotorGravity(AbstractGravity):
 
     in_model: ClassVar[bool] = True
 
-    def compensation(self, arm: SerialArm, phi: cs.SX, K_e: cs.SX, m: SimpleNamespace) -> Contribution:
+    def compensation(self, arm: SerialArm, phi: cs.SX, K_e: cs.SX, m: ArmNumbers) -> Contribution:
         """Return ∇V(φ) and −V(φ)."""
         return Contribution(arm.gravity_torque(phi, m), -arm.potential_energy(phi, m), cs.SX(0))
 
@@ -60,7 +59,7 @@ class StaticGravity(AbstractGravity):
     in_model: ClassVar[bool] = True
     searches: ClassVar[bool] = True
 
-    def rest_position(self, arm: SerialArm, phi: cs.SX, K_e: cs.SX, m: SimpleNamespace) -> cs.SX:
+    def rest_position(self, arm: SerialArm, phi: cs.SX, K_e: cs.SX, m: ArmNumbers) -> cs.SX:
         """Return q̄(φ) (n,)."""
         q = cs.SX.sym("q", arm.n)
         gravity = cs.Function("g", [q, _flat(m)], [arm.gravity_torque(q, m)], {"cse": True})
@@ -69,7 +68,7 @@ class StaticGravity(AbstractGravity):
             rest = phi - gravity(rest, _flat(m)) / K_e
         return rest
 
-    def compensation(self, arm: SerialArm, phi: cs.SX, K_e: cs.SX, m: SimpleNamespace) -> Contribution:
+    def compensation(self, arm: SerialArm, phi: cs.SX, K_e: cs.SX, m: ArmNumbers) -> Contribution:
         """Return K_e (φ − q̄) = ∇V(q̄) and −V_γ(φ)."""
         rest = self.rest_position(arm, phi, K_e, m)
         deflection = phi - rest
@@ -77,6 +76,6 @@ class StaticGravity(AbstractGravity):
         return Contribution(K_e * deflection, -minimum, cs.SX(0))
 
 
-def _flat(m: SimpleNamespace) -> cs.SX:
+def _flat(m: ArmNumbers) -> cs.SX:
     """Return the symbols of the physical parameters, so that they can be arguments of a function."""
     return cs.vertcat(*cs.symvar(cs.vertcat(*(cs.vec(v) for v in vars(m).values()))))

@@ -6,8 +6,7 @@ import abc
 from collections.abc import Hashable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from types import SimpleNamespace
-from typing import NamedTuple, final
+from typing import Any, NamedTuple, Protocol, final
 
 import casadi as cs
 import numpy as np
@@ -19,10 +18,26 @@ from passiflex.control.null_space import null_space_contribution, null_space_dam
 from passiflex.control.signals import Command, LawEnergy, Measurement, Reference, Stored
 from passiflex.control.task import AbstractTask, PoseTask
 from passiflex.layout import Field, Layout
-from passiflex.robots.flexible import FlexibleJointRobot
+from passiflex.robots.flexible import FlexibleJointRobot, RobotNumbers
 from passiflex.robots.linear_algebra import gram, solve_spd
 
 Array = NDArray[np.float64]
+
+
+class Gains(Protocol):
+    """What loops ask of the gains of every law, in symbols; a sampled one sets stiffness and damping every period."""
+
+    stiffness: cs.SX
+    damping: cs.SX
+    regularisation: cs.SX
+
+
+class ImpedanceGains(Gains, Protocol):
+    """The gains of the paper's law, as `ImpedanceLaw.layout` says."""
+
+    shaped_stiffness: cs.SX
+    shaped_inertia: cs.SX
+    null_space_damping: cs.SX
 
 
 class OuterLoop(NamedTuple):
@@ -69,8 +84,8 @@ class AbstractLaw(abc.ABC):
         self,
         y: Measurement,
         reference: Reference,
-        m: SimpleNamespace,
-        g: SimpleNamespace,
+        m: RobotNumbers,
+        g: Any,
         added: cs.SX | float = 0.0,
     ) -> Command:
         """Return the motor torque and the energy that the law claims, for the model m and gains g.
@@ -79,7 +94,7 @@ class AbstractLaw(abc.ABC):
         """
 
     @abc.abstractmethod
-    def stored(self, y: Measurement, m: SimpleNamespace, g: SimpleNamespace) -> Stored:
+    def stored(self, y: Measurement, m: RobotNumbers, g: Any) -> Stored:
         """Return the shaped motors and what they store beside the Cartesian spring."""
 
     @abc.abstractmethod
@@ -87,7 +102,7 @@ class AbstractLaw(abc.ABC):
         """Return φ (n,) of a robot at rest, in numbers; the Cartesian spring is slack there."""
 
     @abc.abstractmethod
-    def motors(self, m: SimpleNamespace, g: SimpleNamespace) -> cs.SX:
+    def motors(self, m: RobotNumbers, g: Any) -> cs.SX:
         """Return the inertia (n,) with which the motors move, kg m²; with that of the links, what the task moves."""
 
 
@@ -124,10 +139,11 @@ class ImpedanceLaw(AbstractLaw):
                 Field("damping", (k, k), "N s/m, N s, N m s/rad", "D_x"),
                 Field("null_space_damping", (), "1/s", "k_ns"),
                 Field("regularisation", (), "1/kg", "ε of Λ = (J M⁻¹ Jᵀ + ε I)⁻¹"),
-            )
+            ),
+            ImpedanceGains,
         )
 
-    def stored(self, y: Measurement, m: SimpleNamespace, g: SimpleNamespace) -> Stored:
+    def stored(self, y: Measurement, m: RobotNumbers, g: ImpedanceGains) -> Stored:
         """Return φ, φ̇ of (11), f(φ), and (14) without links and Cartesian spring."""
         arm, K_e = self.robot.arm, g.shaped_stiffness
         phi, dphi = shaped_motion(y.q, y.theta, y.dq, y.dtheta, m.joint_stiffness, K_e)
@@ -139,12 +155,12 @@ class ImpedanceLaw(AbstractLaw):
         """Return φ of (11)."""
         return q + K / np.asarray(gains["shaped_stiffness"]) * (theta - q)
 
-    def motors(self, m: SimpleNamespace, g: SimpleNamespace) -> cs.SX:
+    def motors(self, m: RobotNumbers, g: ImpedanceGains) -> cs.SX:
         """Return B_e."""
         return g.shaped_inertia
 
     def outer(
-        self, phi: cs.SX, q: cs.SX, reference: Reference, m: SimpleNamespace, g: SimpleNamespace
+        self, phi: cs.SX, q: cs.SX, reference: Reference, m: RobotNumbers, g: ImpedanceGains
     ) -> OuterLoop:
         """Return (12) and (32) with their damping as a matrix, for whoever holds it implicitly."""
         arm, rows = self.robot.arm, slice(0, self.task.size)
@@ -161,8 +177,8 @@ class ImpedanceLaw(AbstractLaw):
         self,
         y: Measurement,
         reference: Reference,
-        m: SimpleNamespace,
-        g: SimpleNamespace,
+        m: RobotNumbers,
+        g: ImpedanceGains,
         added: cs.SX | float = 0.0,
     ) -> Command:
         """Return τ_m of (5) and the energies of (14) and (36)."""
@@ -197,7 +213,7 @@ class ImpedanceLaw(AbstractLaw):
         return Command(tau_m, tau_u, phi, dphi, energy)
 
 
-def _shaped_energies(phi: cs.SX, dphi: cs.SX, q: cs.SX, g: SimpleNamespace) -> tuple[cs.SX, cs.SX]:
+def _shaped_energies(phi: cs.SX, dphi: cs.SX, q: cs.SX, g: ImpedanceGains) -> tuple[cs.SX, cs.SX]:
     """Return ½ φ̇ᵀ B_e φ̇ and ½ (φ − q)ᵀ K_e (φ − q) [J]."""
     stretch = phi - q
     return cs.dot(dphi, g.shaped_inertia * dphi) / 2, cs.dot(stretch, g.shaped_stiffness * stretch) / 2

@@ -9,8 +9,7 @@ reference's own clock: it runs with the time, and slower when the tank is near i
 from __future__ import annotations
 
 from collections.abc import Mapping
-from types import SimpleNamespace
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import casadi as cs
 import numpy as np
@@ -22,6 +21,21 @@ from passiflex.layout import Field, Layout
 from passiflex.robots.arm import EndEffectorPose
 
 DEGREE = 5
+
+
+class MotionNumbers(Protocol):
+    """The coefficients of a motion in symbols, as `MOTION` says."""
+
+    polynomial: cs.SX
+    horizon: cs.SX
+    sine: cs.SX
+    cosine: cs.SX
+    frequency: cs.SX
+    rotation: cs.SX
+    rotation_axis: cs.SX
+    rotation_rate: cs.SX
+
+
 MOTION = Layout(
     (
         Field("polynomial", (3, DEGREE + 1), "m/s^k", "c_k, column k multiplies s^k"),
@@ -32,7 +46,8 @@ MOTION = Layout(
         Field("rotation", (3, 3), "1", "R₀"),
         Field("rotation_axis", (3,), "1", "u, of unit length"),
         Field("rotation_rate", (), "rad/s", "ρ"),
-    )
+    ),
+    MotionNumbers,
 )
 
 ENDLESS = 1e9
@@ -48,7 +63,7 @@ class Pose(NamedTuple):
     rotation: NDArray[np.float64]
 
 
-def reference_at(clock: cs.SX, rate: cs.SX, c: SimpleNamespace) -> Reference:
+def reference_at(clock: cs.SX, rate: cs.SX, c: MotionNumbers) -> Reference:
     """Return the reference at the clock s, which runs at `rate` = ṡ, for a view c of `MOTION`."""
     s, moving = cs.fmin(clock, c.horizon), clock < c.horizon
     powers = cs.vertcat(*(s**k for k in range(DEGREE + 1)))

@@ -5,21 +5,28 @@ from __future__ import annotations
 from collections.abc import Hashable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from types import SimpleNamespace
-from typing import final
+from typing import Protocol, final
 
 import casadi as cs
 from numpy.typing import ArrayLike
 
 from passiflex.control.gravity import AbstractGravity, RobotGravity
-from passiflex.control.law import AbstractLaw, Array
+from passiflex.control.law import AbstractLaw, Array, Gains
 from passiflex.control.null_space import inverse_cartesian_inertia, null_space_contribution
 from passiflex.control.signals import Command, LawEnergy, Measurement, Reference, Stored
 from passiflex.control.task import AbstractTask, PoseTask
 from passiflex.layout import Field, Layout
 from passiflex.robots.arm import SerialArm
-from passiflex.robots.flexible import FlexibleJointRobot
+from passiflex.robots.flexible import FlexibleJointRobot, RobotNumbers
 from passiflex.robots.linear_algebra import solve_spd
+
+
+class RigidGains(Gains, Protocol):
+    """The gains of the rigid law, as its `layout` says."""
+
+    target_inertia: cs.SX
+    null_space_damping: cs.SX
+    carried_inertia: cs.SX
 
 
 @final
@@ -60,10 +67,11 @@ class RigidImpedanceLaw(AbstractLaw):
                 Field("null_space_damping", (), "1/s", "k_ns"),
                 Field("regularisation", (), "1/kg", "ε of Λ = (J M⁻¹ Jᵀ + ε I)⁻¹"),
                 Field("carried_inertia", (self.robot.n,), "kg m^2", "motor inertia that the law knows of"),
-            )
+            ),
+            RigidGains,
         )
 
-    def stored(self, y: Measurement, m: SimpleNamespace, g: SimpleNamespace) -> Stored:
+    def stored(self, y: Measurement, m: RobotNumbers, g: RigidGains) -> Stored:
         """Return the real motors as they are measured, with what they and the real joints store."""
         arm, q, dq = self.robot.arm, y.theta, y.dtheta
         motors, springs = _joint_energies(y, m)
@@ -73,7 +81,7 @@ class RigidImpedanceLaw(AbstractLaw):
         """Return θ: the law takes the motors for the links."""
         return theta
 
-    def motors(self, m: SimpleNamespace, g: SimpleNamespace) -> cs.SX:
+    def motors(self, m: RobotNumbers, g: RigidGains) -> cs.SX:
         """Return B, whether the law knows of it or not."""
         return m.motor_inertia
 
@@ -81,8 +89,8 @@ class RigidImpedanceLaw(AbstractLaw):
         self,
         y: Measurement,
         reference: Reference,
-        m: SimpleNamespace,
-        g: SimpleNamespace,
+        m: RobotNumbers,
+        g: RigidGains,
         added: cs.SX | float = 0.0,
     ) -> Command:
         """Return the torque of the rigid law, with U and its damping as the claimed energies."""
@@ -121,13 +129,13 @@ class RigidImpedanceLaw(AbstractLaw):
         return Command(tau_m, tau_m, q, dq, energy)
 
 
-def _joint_energies(y: Measurement, m: SimpleNamespace) -> tuple[cs.SX, cs.SX]:
+def _joint_energies(y: Measurement, m: RobotNumbers) -> tuple[cs.SX, cs.SX]:
     """Return ½ θ̇ᵀ B θ̇ and ½ (θ − q)ᵀ K (θ − q) [J]."""
     stretch = y.theta - y.q
     return cs.dot(y.dtheta, m.motor_inertia * y.dtheta) / 2, cs.dot(stretch, m.joint_stiffness * stretch) / 2
 
 
-def _task_bias(arm: SerialArm, rows: slice, q: cs.SX, dq: cs.SX, m: SimpleNamespace) -> cs.SX:
+def _task_bias(arm: SerialArm, rows: slice, q: cs.SX, dq: cs.SX, m: RobotNumbers) -> cs.SX:
     """Return J̇ q̇ (k,), also where q and q̇ are expressions."""
     angle, rate = cs.SX.sym("q", arm.n), cs.SX.sym("dq", arm.n)
     free = cs.symvar(cs.vertcat(*(cs.vec(v) for v in vars(m).values())))

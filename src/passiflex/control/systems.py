@@ -6,13 +6,12 @@ vector field is Propositions 1–3, and a test. (24) is the corrected one (theor
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import casadi as cs
 
 from passiflex.control.inner_loop import shaped_damping
-from passiflex.control.law import ImpedanceLaw
+from passiflex.control.law import ImpedanceGains, ImpedanceLaw
 from passiflex.control.null_space import null_space_damping
 from passiflex.layout import Field, Layout
 from passiflex.phs.mechanics import (
@@ -23,11 +22,18 @@ from passiflex.phs.mechanics import (
 )
 from passiflex.phs.system import PortHamiltonianSystem
 from passiflex.robots.arm import EndEffectorPose
-from passiflex.robots.flexible import FlexibleJointRobot
+from passiflex.robots.flexible import FlexibleJointRobot, RobotNumbers
 
 SHAPING = ("shaped_stiffness", "shaped_inertia")
 DESIRED = Layout((Field("desired_position", (3,), "m"), Field("desired_rotation", (3, 3), "1")))
 FILL = Layout((Field("tank_fill", (), "1"),))
+
+
+class ShapingGains(Protocol):
+    """What the inner loop makes of joints and motors, in symbols."""
+
+    shaped_stiffness: cs.SX
+    shaped_inertia: cs.SX
 
 
 def _gains(n: int) -> Layout:
@@ -40,8 +46,8 @@ def shaped_hamiltonian(
     phi: cs.SX,
     p: cs.SX,
     z: cs.SX,
-    m: SimpleNamespace,
-    g: SimpleNamespace,
+    m: RobotNumbers,
+    g: ShapingGains,
 ) -> cs.SX:
     """Return 𝓗 of (10) [J]."""
     M = robot.arm.mass_matrix(q, m)
@@ -81,7 +87,7 @@ class _Loop(NamedTuple):
 
 
 def _impedance_loop(
-    law: ImpedanceLaw, state: cs.SX, desired: EndEffectorPose, m: SimpleNamespace, g: SimpleNamespace
+    law: ImpedanceLaw, state: cs.SX, desired: EndEffectorPose, m: RobotNumbers, g: ImpedanceGains
 ) -> _Loop:
     arm, rows = law.robot.arm, slice(0, law.task.size)
     q, phi, p, z = cs.vertsplit(state, law.robot.n)

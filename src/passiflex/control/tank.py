@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from types import SimpleNamespace
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import casadi as cs
 
@@ -12,6 +11,17 @@ from passiflex.layout import Field, Layout
 
 NO_CAP = 1e9
 """Level [J] that stands for a tank without a cap; an infinite one would make derivatives ∞ · 0."""
+
+
+class EnergyTankNumbers(Protocol):
+    """The numbers of a tank in symbols, as `EnergyTank.layout` says."""
+
+    tank_fill: cs.SX
+    tank_floor: cs.SX
+    tank_low: cs.SX
+    tank_cap: cs.SX
+    tank_band: cs.SX
+    tank_signed: cs.SX
 
 
 class TankFlow(NamedTuple):
@@ -55,15 +65,16 @@ class EnergyTank:
             Field("tank_cap", (), "J", "level above which energy is spilled; `NO_CAP` for none"),
             Field("tank_band", (), "J", "width over which the inflow fades out below the cap"),
             Field("tank_signed", (), "1", "0: draws |P_X| as the paper; 1: draws P_X"),
-        )
+        ),
+        EnergyTankNumbers,
     )
 
-    def valve(self, level: cs.SX, g: SimpleNamespace) -> cs.SX:
+    def valve(self, level: cs.SX, g: EnergyTankNumbers) -> cs.SX:
         """Return β(T): 0 at the floor, 1 above `tank_low`."""
         return smoothstep((level - g.tank_floor) / (g.tank_low - g.tank_floor))
 
     def flow(
-        self, level: cs.SX, dissipated_power: cs.SX, reference_power: cs.SX, g: SimpleNamespace
+        self, level: cs.SX, dissipated_power: cs.SX, reference_power: cs.SX, g: EnergyTankNumbers
     ) -> TankFlow:
         """Return (23) at the level T [J] under P_D and P_X [W]."""
         room = 1 - smoothstep((level - g.tank_cap) / g.tank_band + 1)

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from types import SimpleNamespace
-from typing import ClassVar, final
+from typing import Any, ClassVar, Protocol, final
 
 import casadi as cs
 
@@ -13,6 +12,13 @@ from passiflex.layout import Field, Layout
 
 DRAG_WIDTH = 1e-3
 """Speed over which a drag's dry part changes its sign [m/s]."""
+
+
+class DragNumbers(Protocol):
+    """How much it drags, in symbols, as `Drag.inputs` says."""
+
+    viscous_drag: cs.SX
+    dry_drag: cs.SX
 
 
 @final
@@ -29,10 +35,11 @@ class Drag(AbstractElement):
             (
                 Field("viscous_drag", (), "N s/m", "of the end effector's linear motion", kept=False),
                 Field("dry_drag", (), "N", "of the end effector's linear motion", kept=False),
-            )
+            ),
+            DragNumbers,
         )
 
-    def act(self, at: Touch, s: SimpleNamespace, m: SimpleNamespace) -> Effect:
+    def act(self, at: Touch, s: DragNumbers, m: Any) -> Effect:
         """Return the force, which has the same form in any axes."""
         v = at.velocity
         drag = (s.viscous_drag + s.dry_drag / cs.sqrt(cs.dot(v, v) + DRAG_WIDTH**2)) * v

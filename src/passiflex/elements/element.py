@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import abc
 from collections.abc import Hashable, Mapping
-from types import SimpleNamespace
-from typing import ClassVar, Literal, NamedTuple
+from typing import Any, ClassVar, Literal, NamedTuple
 
 import casadi as cs
 from numpy.typing import ArrayLike
@@ -36,7 +35,7 @@ class Touch(NamedTuple):
     spin: cs.SX
     position: cs.SX
     rotation: cs.SX
-    own: SimpleNamespace
+    own: Any
 
 
 class Effect(NamedTuple):
@@ -154,5 +153,5 @@ class AbstractElement(abc.ABC):
         return Books(self.name, self.at_tip, self.stores)
 
     @abc.abstractmethod
-    def act(self, at: Touch, s: SimpleNamespace, m: SimpleNamespace) -> Effect:
+    def act(self, at: Touch, s: Any, m: Any) -> Effect:
         """Return the effect, with the inputs s and the parameters m."""

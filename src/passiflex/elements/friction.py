@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, field
-from types import SimpleNamespace
-from typing import ClassVar, Literal, final
+from typing import Any, ClassVar, Literal, Protocol, final
 
 import casadi as cs
 import numpy as np
@@ -13,6 +12,14 @@ from numpy.typing import ArrayLike
 
 from passiflex.elements.element import AbstractElement, Effect, Touch, nothing
 from passiflex.layout import Field, Layout
+
+
+class FrictionNumbers(Protocol):
+    """The friction of the motors in symbols, as `MotorFriction.parameters` says."""
+
+    coulomb_friction: cs.SX
+    viscous_friction: cs.SX
+    friction_width: cs.SX
 
 
 @final
@@ -37,7 +44,8 @@ class MotorFriction(AbstractElement):
                 Field("coulomb_friction", (n,), "N m", "at the motors, seen from the link"),
                 Field("viscous_friction", (n,), "N m s/rad", "at the motors, seen from the link"),
                 Field("friction_width", (), "rad/s", "speed over which Coulomb friction changes its sign"),
-            )
+            ),
+            FrictionNumbers,
         )
 
     def numbers(self, n: int) -> Mapping[str, ArrayLike]:
@@ -58,7 +66,7 @@ class MotorFriction(AbstractElement):
         """Return whether it acts: its numbers are parameters."""
         return type(self), self.acts
 
-    def act(self, at: Touch, s: SimpleNamespace, m: SimpleNamespace) -> Effect:
+    def act(self, at: Touch, s: Any, m: FrictionNumbers) -> Effect:
         """Return the friction torque."""
         rubbing = friction(at.x.dtheta, m.coulomb_friction, m.viscous_friction, m.friction_width)
         return nothing(rubbing.numel())._replace(motor=-rubbing, lost=cs.dot(rubbing, at.x.dtheta))

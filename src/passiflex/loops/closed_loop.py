@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from types import SimpleNamespace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import casadi as cs
 
@@ -99,7 +98,7 @@ class ClosedLoop:
         x, u, p = (cs.SX.sym(name, size) for name, size in sizes.items())
         return x, u, p
 
-    def _views(self) -> tuple[SimpleNamespace, ...]:
+    def _views(self) -> tuple[Any, ...]:
         x, u, p = self._vectors
         return self.state.view(x), self.inputs.view(u), *self.parameters.view(p).values()
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from types import SimpleNamespace
+from typing import Any, Protocol
 
 import casadi as cs
 import numpy as np
@@ -15,6 +15,15 @@ from passiflex.robots.flexible import FlexibleJointRobot
 
 SLACK = 1e-9
 """Share of a limit by which rounding may pass it."""
+
+
+class LimitNumbers(Protocol):
+    """The limits of a robot in symbols, as `JointExtremes.limits` says."""
+
+    lower_position_limit: cs.SX
+    upper_position_limit: cs.SX
+    velocity_limit: cs.SX
+    torque_limit: cs.SX
 
 
 @dataclass(frozen=True)
@@ -49,7 +58,8 @@ class JointExtremes:
                 Field("upper_position_limit", (n,), self.angle, "of the robot"),
                 Field("velocity_limit", (n,), self.speed, "of the robot"),
                 Field("torque_limit", (n,), self.torque, "of the robot"),
-            )
+            ),
+            LimitNumbers,
         )
 
     def numbers(self, robot: FlexibleJointRobot) -> NDArray[np.float64]:
@@ -73,12 +83,12 @@ class JointExtremes:
 
     def after(
         self,
-        w: SimpleNamespace,
+        w: Any,
         time: cs.SX,
         q: cs.SX,
         dq: cs.SX,
         tau_m: cs.SX | None,
-        g: SimpleNamespace,
+        g: LimitNumbers,
         first: cs.SX,
     ) -> dict[str, cs.SX]:
         """Return the memory after an instant; `first` is 1 if it is the first."""

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from types import SimpleNamespace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import casadi as cs
 import numpy as np
@@ -117,7 +117,7 @@ class Plant:
         """Return the robot's own state."""
         return RobotState(*(x[self.state.slices[name]] for name in RobotState._fields))
 
-    def flow(self, x: cs.SX, tau_m: cs.SX, s: SimpleNamespace, m: SimpleNamespace) -> Flow:
+    def flow(self, x: cs.SX, tau_m: cs.SX, s: Any, m: Any) -> Flow:
         """Return what happens in the state x under a motor torque."""
         arm, robot = self.robot.arm, self.view(x)
         at = self._touch(x, m)
@@ -141,13 +141,13 @@ class Plant:
             rate |= vars(element.state(self.robot.n).view(effect.rate))
         return Flow(rate, {f.name: powers[f.name] for f in self.energies})
 
-    def _touch(self, x: cs.SX, m: SimpleNamespace) -> Touch:
+    def _touch(self, x: cs.SX, m: Any) -> Touch:
         arm, robot = self.robot.arm, self.view(x)
         velocity, spin = arm.tip_velocity(robot.q, robot.dq, m)
         axes = cs.horzcat(*(arm.in_world_axes(robot.q, axis) for axis in cs.horzsplit(cs.SX.eye(3))))
         return Touch(robot, velocity, spin, arm.pose(robot.q, m).position, axes, own=SimpleNamespace())
 
-    def _effects(self, at: Touch, x: cs.SX, s: SimpleNamespace, m: SimpleNamespace) -> list[Effect]:
+    def _effects(self, at: Touch, x: cs.SX, s: Any, m: Any) -> list[Effect]:
         effects = []
         for element in self.elements:
             layout = element.state(self.robot.n)
@@ -156,17 +156,17 @@ class Plant:
             effects.append(acting)
         return effects
 
-    def wrench(self, x: cs.SX, s: SimpleNamespace, m: SimpleNamespace) -> cs.SX:
+    def wrench(self, x: cs.SX, s: Any, m: Any) -> cs.SX:
         """Return all that acts on the end effector, in world axes (6,)."""
         return self._world_wrench(_sum(self._effects(self._touch(x, m), x, s, m), self.robot.n), x, s)
 
-    def _world_wrench(self, touched: Effect, x: cs.SX, s: SimpleNamespace) -> cs.SX:
+    def _world_wrench(self, touched: Effect, x: cs.SX, s: Any) -> cs.SX:
         parts = (
             self.robot.arm.in_world_axes(self.view(x).q, part) for part in (touched.force, touched.moment)
         )
         return s.F_e + cs.vertcat(*parts)
 
-    def true(self, x: cs.SX, s: SimpleNamespace, m: SimpleNamespace) -> Truth:
+    def true(self, x: cs.SX, s: Any, m: Any) -> Truth:
         """Return what is true at one instant."""
         arm, robot, n = self.robot.arm, self.view(x), self.robot.n
         torque, across = arm.chain.joint_units[2], ("axis", "column")
@@ -188,7 +188,7 @@ class Plant:
             energies=self._energies(robot, effects, m),
         )
 
-    def _energies(self, x: RobotState, effects: list[Effect], m: SimpleNamespace) -> tuple[Signal, ...]:
+    def _energies(self, x: RobotState, effects: list[Effect], m: Any) -> tuple[Signal, ...]:
         """Return what robot and elements store."""
         arm, stretch = self.robot.arm, x.theta - x.q
 

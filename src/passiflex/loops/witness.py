@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from types import SimpleNamespace
-from typing import NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import casadi as cs
 import numpy as np
 from numpy.typing import NDArray
 
 from passiflex.layout import Field, Layout
-from passiflex.loops.joint_extremes import JointExtremes
+from passiflex.loops.joint_extremes import JointExtremes, LimitNumbers
 from passiflex.robots.flexible import FlexibleJointRobot
 
 Array = NDArray[np.float64]
@@ -66,6 +66,12 @@ class Instant(NamedTuple):
     latched: cs.SX | None = None
 
 
+class WitnessNumbers(LimitNumbers, Protocol):
+    """What a witness is told, in symbols, as `Witness.parameters` says."""
+
+    initial_tank: cs.SX
+
+
 class Noted(NamedTuple):
     """What was noted of a whole run: what each number is, and the numbers by name."""
 
@@ -101,9 +107,8 @@ class Witness:
     @cached_property
     def parameters(self) -> Layout:
         """Return the numbers that it is told."""
-        return (
-            Layout((Field("initial_tank", (), "J", "T₀; 0 for a law without a tank"),)) + self.joints.limits
-        )
+        initial = Field("initial_tank", (), "J", "T₀; 0 for a law without a tank")
+        return Layout((initial, *self.joints.limits), WitnessNumbers)
 
     @cached_property
     def own(self) -> Layout:
@@ -155,14 +160,14 @@ class Witness:
             values[name] -= np.minimum(values["lowest_storage"], 0.0)
         return Noted(self.extremes, values)
 
-    def glance(self, w: SimpleNamespace, time: cs.SX, joint: cs.SX, carried: cs.SX) -> cs.SX:
+    def glance(self, w: Any, time: cs.SX, joint: cs.SX, carried: cs.SX) -> cs.SX:
         """Return the memory after an instant between two looks, at which only W̃ has changed.
 
         What had taken most by then is seen at the next look.
         """
         return self.memory.stack(vars(w) | self._margin(w, w.whole, time, joint - carried + w.carried_start))
 
-    def look(self, w: SimpleNamespace, now: Instant, g: SimpleNamespace) -> cs.SX:
+    def look(self, w: Any, now: Instant, g: WitnessNumbers) -> cs.SX:
         """Return the memory after an instant."""
         first = w.noted < 1
         start, was = self._start(w, now, g, first)
@@ -190,7 +195,7 @@ class Witness:
         return self.memory.stack(vars(start) | vars(was) | found | terms | known | joints)
 
     def _start(
-        self, w: SimpleNamespace, now: Instant, g: SimpleNamespace, first: cs.SX
+        self, w: Any, now: Instant, g: WitnessNumbers, first: cs.SX
     ) -> tuple[SimpleNamespace, SimpleNamespace]:
         """Return what is remembered of the start, and of the extremes before this instant; all begins with it."""
 
@@ -218,7 +223,7 @@ class Witness:
         )
         return start, was
 
-    def _margin(self, w: SimpleNamespace, whole: cs.SX, time: cs.SX, given: cs.SX) -> dict[str, cs.SX]:
+    def _margin(self, w: Any, whole: cs.SX, time: cs.SX, given: cs.SX) -> dict[str, cs.SX]:
         """Return what the margin `whole` − `given` changes of what is remembered."""
         margin, error = whole - given, w.largest_integration_error
         round_off = ROUND_OFF * cs.fmax(1, w.largest)

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from types import SimpleNamespace
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import casadi as cs
 import numpy as np
@@ -16,6 +15,17 @@ from passiflex.robots.chain import SerialChain
 from passiflex.robots.joint_frames import Inertia, Wrench
 from passiflex.robots.recursions import Placed, Recursions
 from passiflex.robots.vectors import cross, plus
+
+
+class ArmNumbers(Protocol):
+    """The physical parameters of a rigid arm in symbols, as `SerialArm.layout` says."""
+
+    link_mass: cs.SX
+    link_moment: cs.SX
+    link_inertia: cs.SX
+    gravity: cs.SX
+    tool_position: cs.SX
+    tool_rotation: cs.SX
 
 
 class EndEffectorPose(NamedTuple):
@@ -72,7 +82,8 @@ class SerialArm:
                 Field("gravity", (3,), "m/s^2", "gravitational acceleration in world axes"),
                 Field("tool_position", (3,), "m", "end effector in the frame of the last link"),
                 Field("tool_rotation", (3, 3), "1", "axes of the end effector in the frame of the last link"),
-            )
+            ),
+            ArmNumbers,
         )
 
     def nominal(self, gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)) -> dict[str, np.ndarray]:
@@ -91,14 +102,14 @@ class SerialArm:
     def _recursions(self) -> Recursions:
         return Recursions(self.chain)
 
-    def _bodies(self, m: SimpleNamespace) -> list[Inertia]:
+    def _bodies(self, m: ArmNumbers) -> list[Inertia]:
         return self._recursions.bodies(m.link_mass, m.link_moment, m.link_inertia)
 
-    def mass_matrix(self, q: cs.SX, m: SimpleNamespace) -> cs.SX:
+    def mass_matrix(self, q: cs.SX, m: ArmNumbers) -> cs.SX:
         """Return M(q) (n, n) kg m², link side only."""
         return self._recursions.mass_matrix(self._bodies(m), q)
 
-    def bias_torque(self, q: cs.SX, dq: cs.SX, m: SimpleNamespace, pushed: TipWrench | None = None) -> cs.SX:
+    def bias_torque(self, q: cs.SX, dq: cs.SX, m: ArmNumbers, pushed: TipWrench | None = None) -> cs.SX:
         """Return C(q, q̇) q̇ + ∇V(q) (n,) N m: what keeps the arm at constant velocity.
 
         With a wrench that pushes the end effector it is less by Jᵀ F, at half of what J takes.
@@ -109,7 +120,7 @@ class SerialArm:
             wrench = Wrench(force, plus(cs.vertsplit(pushed.moment), cross(point, force)))
         return self._recursions.newton_euler(self._bodies(m), q, dq, m.gravity, pushed=wrench)
 
-    def tip_velocity(self, q: cs.SX, dq: cs.SX, m: SimpleNamespace) -> TipVelocity:
+    def tip_velocity(self, q: cs.SX, dq: cs.SX, m: ArmNumbers) -> TipVelocity:
         """Return how the end effector moves, in the axes of the last joint."""
         *_, (speed, spin) = self._recursions.velocities(q, dq)
         at_tip = plus(speed, cross(spin, cs.vertsplit(self._tip(m))))
@@ -123,7 +134,7 @@ class SerialArm:
         """Return a vector in the axes of the last joint in world axes (3,)."""
         return cs.vertcat(*self._recursions.outward(q, cs.vertsplit(v)))
 
-    def _tip(self, m: SimpleNamespace) -> cs.SX:
+    def _tip(self, m: ArmNumbers) -> cs.SX:
         """Return the end effector in the frame of the last joint (3,) [m]."""
         return self._link @ m.tool_position
 
@@ -132,32 +143,32 @@ class SerialArm:
         """Return the axes of the last link in those of its joint, as columns."""
         return cs.sparsify(cs.DM(self._recursions.joints[-1].link))
 
-    def coriolis_torque(self, q: cs.SX, dq: cs.SX, m: SimpleNamespace) -> cs.SX:
+    def coriolis_torque(self, q: cs.SX, dq: cs.SX, m: ArmNumbers) -> cs.SX:
         """Return C(q, q̇) q̇ (n,) N m."""
         return self._recursions.newton_euler(self._bodies(m), q, dq, cs.SX(3, 1))
 
-    def gravity_torque(self, q: cs.SX, m: SimpleNamespace) -> cs.SX:
+    def gravity_torque(self, q: cs.SX, m: ArmNumbers) -> cs.SX:
         """Return ∇V(q) (n,) N m."""
         return self._recursions.newton_euler(self._bodies(m), q, cs.SX(self.n, 1), m.gravity)
 
-    def kinetic_energy(self, q: cs.SX, dq: cs.SX, m: SimpleNamespace) -> cs.SX:
+    def kinetic_energy(self, q: cs.SX, dq: cs.SX, m: ArmNumbers) -> cs.SX:
         """Return ½ q̇ᵀ M(q) q̇ [J]."""
         return self._recursions.kinetic_energy(self._bodies(m), q, dq)
 
-    def potential_energy(self, q: cs.SX, m: SimpleNamespace) -> cs.SX:
+    def potential_energy(self, q: cs.SX, m: ArmNumbers) -> cs.SX:
         """Return V(q) = −Σ mᵢ gᵀ rᵢ(q) [J], zero with all mass at the base's origin."""
         return self._recursions.potential_energy(self._bodies(m), q, m.gravity)
 
-    def pose(self, q: cs.SX, m: SimpleNamespace) -> EndEffectorPose:
+    def pose(self, q: cs.SX, m: ArmNumbers) -> EndEffectorPose:
         """Return x = f(q), the end-effector frame in world axes."""
         return self._pose(list(self._recursions.placed(q))[-1], m)
 
-    def _pose(self, last: Placed, m: SimpleNamespace) -> EndEffectorPose:
+    def _pose(self, last: Placed, m: ArmNumbers) -> EndEffectorPose:
         """Return the end-effector frame from that of the last joint."""
         link = cs.horzcat(*(cs.vertcat(*axis) for axis in last.axes)) @ self._link
         return EndEffectorPose(cs.vertcat(*last.origin) + link @ m.tool_position, link @ m.tool_rotation)
 
-    def jacobian(self, q: cs.SX, m: SimpleNamespace) -> cs.SX:
+    def jacobian(self, q: cs.SX, m: ArmNumbers) -> cs.SX:
         """Return J(q) (6×n): linear, then angular velocity at the end-effector point, world axes."""
         placed = list(self._recursions.placed(q))
         tip = self._pose(placed[-1], m).position
@@ -170,7 +181,7 @@ class SerialArm:
                 columns.append(cs.vertcat(cs.cross(axis, tip - cs.vertcat(*frame.origin)), axis))
         return cs.densify(cs.horzcat(*columns))
 
-    def coriolis_matrix(self, q: cs.SX, dq: cs.SX, m: SimpleNamespace) -> cs.SX:
+    def coriolis_matrix(self, q: cs.SX, dq: cs.SX, m: ArmNumbers) -> cs.SX:
         """Return the C(q, q̇) of the Christoffel symbols, for which ∂M/∂t = C + Cᵀ.
 
         Built by differentiation of M: for analysis and tests, not for control.

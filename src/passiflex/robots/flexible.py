@@ -6,8 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from pathlib import Path
-from types import SimpleNamespace
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import casadi as cs
 import numpy as np
@@ -15,9 +14,17 @@ from numpy.typing import NDArray
 
 from passiflex.errors import SizeError, ValueRangeError
 from passiflex.layout import Field, Layout
-from passiflex.robots.arm import SerialArm, TipWrench
+from passiflex.robots.arm import ArmNumbers, SerialArm, TipWrench
 from passiflex.robots.catalogue import RobotDescription, read_description
 from passiflex.robots.linear_algebra import solve_spd
+
+
+class RobotNumbers(ArmNumbers, Protocol):
+    """The physical parameters of a robot in symbols, as `FlexibleJointRobot.layout` says."""
+
+    joint_stiffness: cs.SX
+    joint_damping: cs.SX
+    motor_inertia: cs.SX
 
 
 class RobotState(NamedTuple):
@@ -99,13 +106,12 @@ class FlexibleJointRobot:
     def layout(self) -> Layout:
         """Return all physical parameters: the arm's, then K, D, B."""
         n = self.n
-        return self.arm.layout + Layout(
-            (
-                Field("joint_stiffness", (n,), "N m/rad", "K"),
-                Field("joint_damping", (n,), "N m s/rad", "D"),
-                Field("motor_inertia", (n,), "kg m^2", "B, reflected through the gear"),
-            )
+        joints = (
+            Field("joint_stiffness", (n,), "N m/rad", "K"),
+            Field("joint_damping", (n,), "N m s/rad", "D"),
+            Field("motor_inertia", (n,), "kg m^2", "B, reflected through the gear"),
         )
+        return Layout(self.arm.layout.fields + joints, RobotNumbers)
 
     def nominal(self, gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)) -> dict[str, np.ndarray]:
         """Return the robot's own numbers for `layout`."""
@@ -115,12 +121,12 @@ class FlexibleJointRobot:
             "motor_inertia": np.array(self.motor_inertia),
         }
 
-    def joint_torque(self, x: RobotState, m: SimpleNamespace) -> cs.SX:
+    def joint_torque(self, x: RobotState, m: RobotNumbers) -> cs.SX:
         """Return τ_a = K (θ − q) + D (θ̇ − q̇) [N m], the last line of (2)."""
         return m.joint_stiffness * (x.theta - x.q) + m.joint_damping * (x.dtheta - x.dq)
 
     def acceleration(
-        self, x: RobotState, tau_m: cs.SX, external: cs.SX | TipWrench, m: SimpleNamespace
+        self, x: RobotState, tau_m: cs.SX, external: cs.SX | TipWrench, m: RobotNumbers
     ) -> Acceleration:
         """Return q̈, θ̈ of (2) under the motor torque τ_m [N m] and what acts from outside.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
+from typing import Protocol
 
 import casadi as cs
 
@@ -14,6 +14,16 @@ FARTHEST = 1.0
 """Most that the error of the end effector is taken to have moved the joints [rad], near a singular posture too."""
 
 
+class ActionNumbers(Protocol):
+    """The numbers of the actions in symbols, as `action_layout` says."""
+
+    posture_stiffness: cs.SX
+    posture_damping: cs.SX
+    posture: cs.SX
+    follow_velocity: cs.SX
+    follow_acceleration: cs.SX
+
+
 def action_layout(n: int) -> Layout:
     """Return the parameters; a zero switches an action off."""
     return Layout(
@@ -23,7 +33,8 @@ def action_layout(n: int) -> Layout:
             Field("posture", (n,), "rad", "where that spring pulls the shaped motors to"),
             Field("follow_velocity", (), "1", "share of D_x ẋ_d that is fed forward"),
             Field("follow_acceleration", (), "1", "share of Λ ẍ_d that is fed forward"),
-        )
+        ),
+        ActionNumbers,
     )
 
 
@@ -34,7 +45,7 @@ def posture_spring(
     phi: cs.SX,
     dphi: cs.SX,
     regularisation: cs.SX,
-    a: SimpleNamespace,
+    a: ActionNumbers,
 ) -> cs.SX:
     """Return N [K_n (φ_n − φ + J̄ e) − D_n Nᵀ φ̇] [N m], N = I − Jᵀ J̄ᵀ: toward a posture, no wrench at the end effector.
 
@@ -68,7 +79,7 @@ def tracking_wrench(
     velocity: cs.SX,
     acceleration: cs.SX,
     regularisation: cs.SX,
-    a: SimpleNamespace,
+    a: ActionNumbers,
 ) -> cs.SX:
     """Return D_x ẋ_d + Λ ẍ_d, each by its share: with it the end effector does not lag a moving reference."""
     mobility = inverse_cartesian_inertia(mass_matrix, jacobian, regularisation)

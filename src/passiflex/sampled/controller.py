@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from functools import cached_property
 from types import SimpleNamespace
-from typing import final
+from typing import Any, final
 
 import casadi as cs
 
-from passiflex.control.law import AbstractLaw, Stored
+from passiflex.control.law import AbstractLaw, Gains, Stored
 from passiflex.control.signals import Command, Measurement, Reference
 from passiflex.layout import Field, Layout
 from passiflex.parts import Parts
@@ -27,7 +27,7 @@ from passiflex.sampled.measurement_bound import (
 from passiflex.sampled.period import Force, Granted, Read, Settled
 from passiflex.sampled.period_state import period_after, period_start, period_state
 from passiflex.sampled.rest import Remembered, Rest
-from passiflex.sampled.signals import ControlParameters, LedgerEntry, PeriodResult, Setpoint
+from passiflex.sampled.signals import ControlNumbers, LedgerEntry, ObserverNumbers, PeriodResult, Setpoint
 from passiflex.sampled.tank import AbstractTank, PeriodFlows, added, finite, unchanged
 
 LARGEST_READING = 1e30
@@ -54,21 +54,21 @@ class SampledController:
 
     @cached_property
     def parameters(self) -> Parts:
-        """Return the layouts of `ControlParameters`, by the names of its parts."""
+        """Return the layouts of `ControlNumbers`, by the names of its parts."""
         robot, gains = self.law.robot, self.law.layout
-        observer = Layout((Field("bandwidth", (), "rad/s", "of the external torque's estimator"),))
-        actions = action_layout(robot.n)
-        layouts = ControlParameters(
-            model=robot.layout,
-            gains=gains,
-            fallback=gains,
-            tank=AbstractTank.layout,
-            actions=actions,
-            observer=observer,
-            inner=AbstractInnerLoop.layout,
-            errors=error_layout(robot.n),
-        )
-        return Parts(layouts._asdict())
+        layouts = {
+            "model": robot.layout,
+            "gains": gains,
+            "fallback": gains,
+            "tank": AbstractTank.layout,
+            "actions": action_layout(robot.n),
+            "observer": Layout(
+                (Field("bandwidth", (), "rad/s", "of the external torque's estimator"),), ObserverNumbers
+            ),
+            "inner": AbstractInnerLoop.layout,
+            "errors": error_layout(robot.n),
+        }
+        return Parts({part: layouts[part] for part in ControlNumbers._fields})
 
     @cached_property
     def state(self) -> Layout:
@@ -90,7 +90,7 @@ class SampledController:
         elapsed: cs.SX,
         applied: cs.SX,
         state: cs.SX,
-        p: ControlParameters[SimpleNamespace],
+        p: ControlNumbers,
     ) -> PeriodResult:
         """Return command, next state and ledger entry, `elapsed` seconds after the last period that ran.
 
@@ -127,8 +127,8 @@ class SampledController:
         y: Measurement,
         applied: cs.SX,
         elapsed: cs.SX,
-        s: SimpleNamespace,
-        p: ControlParameters[SimpleNamespace],
+        s: Any,
+        p: ControlNumbers,
     ) -> Read:
         """Return the measurement as estimators and inner loop believe it."""
         elapsed = s.lost_time + cs.if_else(finite(elapsed, below=LARGEST_READING), elapsed, 0)
@@ -138,7 +138,7 @@ class SampledController:
         first = s.running < 1
         return Read(y, elapsed, first, observed, seen, booked_bound(y, elapsed, first, s, p.errors))
 
-    def _settle(self, r: Read, s: SimpleNamespace, p: ControlParameters[SimpleNamespace]) -> Settled:
+    def _settle(self, r: Read, s: Any, p: ControlNumbers) -> Settled:
         """Return the books after what the period before took or gave."""
         held = EndEffectorPose(s.governed_position, s.governed_rotation)
         before = self.law.stored(r.y, p.model, _chosen(s.latched, p.fallback, p.gains))
@@ -156,9 +156,7 @@ class SampledController:
         settled = self.tank.settle(s.tank_energy, flows, p.tank) if self.tank else unchanged(s.tank_energy)
         return Settled(settled, work, storage, held)
 
-    def _in_force(
-        self, r: Read, settled: Settled, s: SimpleNamespace, p: ControlParameters[SimpleNamespace]
-    ) -> Force:
+    def _in_force(self, r: Read, settled: Settled, s: Any, p: ControlNumbers) -> Force:
         """Return what is in force: the fallback from the period on in which the tank is overdrawn, T + S kept.
 
         It is overdrawn if its level shows it beyond what the sensors explain.
@@ -192,7 +190,7 @@ class SampledController:
         f: Force,
         granted: Granted,
         setpoint: Setpoint,
-        p: ControlParameters[SimpleNamespace],
+        p: ControlNumbers,
     ) -> tuple[Command, cs.SX]:
         """Return the law's command with what the valve lets through, and the valve."""
         level = granted.entry.level
@@ -214,7 +212,7 @@ class SampledController:
     def _potential(self, at: Stored, reference: EndEffectorPose, stiffness: cs.SX) -> cs.SX:
         return self.law.task.potential(at.pose, reference, stiffness)
 
-    def _grant(self, r: Read, f: Force, setpoint: Setpoint, p: ControlParameters[SimpleNamespace]) -> Granted:
+    def _grant(self, r: Read, f: Force, setpoint: Setpoint, p: ControlNumbers) -> Granted:
         """Return the reference as far as the tank surely pays for it; a law that has fallen back holds its own."""
         one, level = cs.SX(1), f.tank.level
         if self.tank is None:
@@ -248,8 +246,8 @@ class SampledController:
         now: Stored,
         setpoint: Setpoint,
         granted: Granted,
-        g: SimpleNamespace,
-        p: ControlParameters[SimpleNamespace],
+        g: Gains,
+        p: ControlNumbers,
     ) -> cs.SX:
         """Return the torque of everything that only the tank's valve lets through (n,) N m."""
         arm, rows = self.law.robot.arm, slice(0, self.law.task.size)
@@ -267,7 +265,7 @@ class SampledController:
         return at_end.T @ setpoint.wrench + J_held.T @ follow + posture
 
 
-def _chosen(flag: cs.SX, then: SimpleNamespace, other: SimpleNamespace) -> SimpleNamespace:
+def _chosen(flag: cs.SX, then: Gains, other: Gains) -> Gains:
     return SimpleNamespace(**{k: cs.if_else(flag, v, getattr(other, k)) for k, v in vars(then).items()})
 
 

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import abc
 from dataclasses import dataclass
-from types import SimpleNamespace
-from typing import ClassVar, NamedTuple, final
+from typing import Any, ClassVar, NamedTuple, final
 
 import casadi as cs
 
 from passiflex.control.signals import Measurement
 from passiflex.layout import Field, Layout
 from passiflex.robots.arm import SerialArm
+from passiflex.robots.flexible import RobotNumbers
 from passiflex.robots.linear_algebra import solve_spd
 from passiflex.sampled.rest import Remembered, Rest
 from passiflex.sampled.sensors import low_pass
@@ -31,7 +31,7 @@ class Known(NamedTuple):
     """What an estimator may use: the arm, the numbers m of the law's model, its bandwidth [rad/s]."""
 
     arm: SerialArm
-    m: SimpleNamespace
+    m: RobotNumbers
     bandwidth: cs.SX
 
 
@@ -50,7 +50,7 @@ class AbstractExternalTorque(abc.ABC):
         return self.state(at.q.size).zeros()
 
     @abc.abstractmethod
-    def estimate(self, y: Measurement, elapsed: cs.SX, known: Known, s: SimpleNamespace) -> Estimate:
+    def estimate(self, y: Measurement, elapsed: cs.SX, known: Known, s: Any) -> Estimate:
         """Return y with τ_e and F_e replaced."""
 
 
@@ -63,7 +63,7 @@ class TrueTorque(AbstractExternalTorque):
         """Return nothing."""
         return Layout(())
 
-    def estimate(self, y: Measurement, elapsed: cs.SX, known: Known, s: SimpleNamespace) -> Estimate:
+    def estimate(self, y: Measurement, elapsed: cs.SX, known: Known, s: Any) -> Estimate:
         """Return y as it is."""
         return Estimate(y, cs.SX(0, 1))
 
@@ -77,7 +77,7 @@ class MeasuredWrench(AbstractExternalTorque):
         """Return nothing."""
         return Layout(())
 
-    def estimate(self, y: Measurement, elapsed: cs.SX, known: Known, s: SimpleNamespace) -> Estimate:
+    def estimate(self, y: Measurement, elapsed: cs.SX, known: Known, s: Any) -> Estimate:
         """Return y with the wrench sensor's τ_e."""
         return Estimate(y._replace(tau_e=known.arm.jacobian(y.q, known.m).T @ y.F_e), cs.SX(0, 1))
 
@@ -93,7 +93,7 @@ class NoTorque(AbstractExternalTorque):
         """Return nothing."""
         return Layout(())
 
-    def estimate(self, y: Measurement, elapsed: cs.SX, known: Known, s: SimpleNamespace) -> Estimate:
+    def estimate(self, y: Measurement, elapsed: cs.SX, known: Known, s: Any) -> Estimate:
         """Return y with nothing external."""
         return Estimate(y._replace(tau_e=cs.SX.zeros(known.arm.n), F_e=cs.SX.zeros(6)), cs.SX(0, 1))
 
@@ -130,7 +130,7 @@ class MomentumObserver(AbstractExternalTorque):
         known = at.running * (at.tau_a - at.weight)
         return self.state(at.q.size).zeros() | {"known_torque": known, "observing": at.running}
 
-    def estimate(self, y: Measurement, elapsed: cs.SX, known: Known, s: SimpleNamespace) -> Estimate:
+    def estimate(self, y: Measurement, elapsed: cs.SX, known: Known, s: Any) -> Estimate:
         """Return y with the observer's τ_e."""
         arm, m = known.arm, known.m
         q = cs.SX.sym("q", arm.n)

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import abc
 from dataclasses import dataclass
-from types import SimpleNamespace
-from typing import ClassVar, NamedTuple, final
+from typing import Any, ClassVar, NamedTuple, Protocol, final
 
 import casadi as cs
 
 from passiflex.control.law import AbstractLaw
 from passiflex.control.signals import Command, Measurement, Reference
 from passiflex.layout import Field, Layout
+from passiflex.robots.flexible import RobotNumbers
 from passiflex.sampled.rest import Remembered, Rest
 
 
@@ -20,6 +20,14 @@ class Seen(NamedTuple):
 
     measured: Measurement
     state: cs.SX
+
+
+class InnerNumbers(Protocol):
+    """The numbers of an inner loop in symbols, as `AbstractInnerLoop.layout` says."""
+
+    period: cs.SX
+    velocity_gain: cs.SX
+    acceleration_gain: cs.SX
 
 
 class AbstractInnerLoop(abc.ABC):
@@ -32,7 +40,8 @@ class AbstractInnerLoop(abc.ABC):
                 "velocity_gain", (), "1", "g: share of the new difference in the link velocity, per period"
             ),
             Field("acceleration_gain", (), "1", "b: share of the new value in the acceleration, per period"),
-        )
+        ),
+        InnerNumbers,
     )
 
     @abc.abstractmethod
@@ -62,9 +71,9 @@ class AbstractInnerLoop(abc.ABC):
         y: Measurement,
         applied: cs.SX,
         elapsed: cs.SX,
-        s: SimpleNamespace,
-        m: SimpleNamespace,
-        i: SimpleNamespace,
+        s: Any,
+        m: RobotNumbers,
+        i: InnerNumbers,
     ) -> Seen:
         """Return the measurement to work with; `applied` is the torque that the motors were told last."""
 
@@ -74,11 +83,11 @@ class AbstractInnerLoop(abc.ABC):
         law: AbstractLaw,
         y: Measurement,
         reference: Reference,
-        m: SimpleNamespace,
-        g: SimpleNamespace,
+        m: RobotNumbers,
+        g: Any,
         added: cs.SX,
-        seen: SimpleNamespace,
-        i: SimpleNamespace,
+        seen: Any,
+        i: InnerNumbers,
     ) -> Command:
         """Return the command, with `added` as further torque on the shaped motors."""
 
@@ -97,9 +106,9 @@ class PlainInnerLoop(AbstractInnerLoop):
         y: Measurement,
         applied: cs.SX,
         elapsed: cs.SX,
-        s: SimpleNamespace,
-        m: SimpleNamespace,
-        i: SimpleNamespace,
+        s: Any,
+        m: RobotNumbers,
+        i: InnerNumbers,
     ) -> Seen:
         """Return y as it is."""
         return Seen(y, cs.SX(0, 1))
@@ -109,11 +118,11 @@ class PlainInnerLoop(AbstractInnerLoop):
         law: AbstractLaw,
         y: Measurement,
         reference: Reference,
-        m: SimpleNamespace,
-        g: SimpleNamespace,
+        m: RobotNumbers,
+        g: Any,
         added: cs.SX,
-        seen: SimpleNamespace,
-        i: SimpleNamespace,
+        seen: Any,
+        i: InnerNumbers,
     ) -> Command:
         """Return the law's own command."""
         return law.command(y, reference, m, g, added)

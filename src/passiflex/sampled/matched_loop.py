@@ -10,18 +10,18 @@ from a slow estimate of the acceleration, so that no M⁻¹ enters.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from types import SimpleNamespace
-from typing import ClassVar, NamedTuple, final
+from typing import Any, ClassVar, NamedTuple, final
 
 import casadi as cs
 import numpy as np
 
 from passiflex.control.inner_loop import shaped_damping
-from passiflex.control.law import AbstractLaw, ImpedanceLaw
+from passiflex.control.law import AbstractLaw, ImpedanceGains, ImpedanceLaw
 from passiflex.control.signals import Command, LawEnergy, Measurement, Reference
 from passiflex.layout import Field, Layout
+from passiflex.robots.flexible import RobotNumbers
 from passiflex.robots.linear_algebra import solve_spd
-from passiflex.sampled.inner_loop import AbstractInnerLoop, Seen
+from passiflex.sampled.inner_loop import AbstractInnerLoop, InnerNumbers, Seen
 from passiflex.sampled.rest import Remembered, Rest
 
 SLOW = 1e-2
@@ -109,9 +109,9 @@ class MatchedInnerLoop(AbstractInnerLoop):
         y: Measurement,
         applied: cs.SX,
         elapsed: cs.SX,
-        s: SimpleNamespace,
-        m: SimpleNamespace,
-        i: SimpleNamespace,
+        s: Any,
+        m: RobotNumbers,
+        i: InnerNumbers,
     ) -> Seen:
         """Return y with q, q̇ and θ̇ estimated."""
         K, D, B = m.joint_stiffness, m.joint_damping, m.motor_inertia
@@ -140,26 +140,11 @@ class MatchedInnerLoop(AbstractInnerLoop):
         )
         return Seen(y._replace(dq=dq, dtheta=rate), state)
 
-    def command(
-        self,
-        law: AbstractLaw,
-        y: Measurement,
-        reference: Reference,
-        m: SimpleNamespace,
-        g: SimpleNamespace,
-        added: cs.SX,
-        seen: SimpleNamespace,
-        i: SimpleNamespace,
-    ) -> Command:
-        """Return the torque whose hold ends at the velocity of the shaped motor."""
-        assert isinstance(law, ImpedanceLaw)
-        K, D, B, T = m.joint_stiffness, m.joint_damping, m.motor_inertia, i.period
-        share = K / g.shaped_stiffness
-        B_s = share * g.shaped_inertia  # the shaped motor, as a motor on the real spring
-        a = seen.seen_ddq
-        flow = joint_flow(K, D, B, T)
-
-        # The state in which the command begins to act: once for each torque on its way, the oldest first.
+    def _arrival(
+        self, y: Measurement, m: RobotNumbers, flow: JointFlow, seen: Any, T: cs.SX
+    ) -> tuple[cs.SX, cs.SX, cs.SX, cs.SX]:
+        """Return q, q̇, δ, θ̇ when the command begins to act: a step for each torque on its way, the oldest first."""
+        K, D, B, a = m.joint_stiffness, m.joint_damping, m.motor_inertia, seen.seen_ddq
         delta, v, w = (y.tau_a - D * (y.dtheta - y.dq)) / K, y.dq, y.dtheta
         q = y.theta - delta
         for k in range(1, self.late + 1):
@@ -169,7 +154,27 @@ class MatchedInnerLoop(AbstractInnerLoop):
             v += T * a
             delta = rest + flow.stay * off + flow.push * slip
             w = v - K / B * flow.push * off + flow.keep * slip
+        return q, v, delta, w
 
+    def command(
+        self,
+        law: AbstractLaw,
+        y: Measurement,
+        reference: Reference,
+        m: RobotNumbers,
+        g: ImpedanceGains,
+        added: cs.SX,
+        seen: Any,
+        i: InnerNumbers,
+    ) -> Command:
+        """Return the torque whose hold ends at the velocity of the shaped motor."""
+        assert isinstance(law, ImpedanceLaw)
+        K, D, B, T = m.joint_stiffness, m.joint_damping, m.motor_inertia, i.period
+        share = K / g.shaped_stiffness
+        B_s = share * g.shaped_inertia  # the shaped motor, as a motor on the real spring
+        a = seen.seen_ddq
+        flow = joint_flow(K, D, B, T)
+        q, v, delta, w = self._arrival(y, m, flow, seen, T)
         phi = q + share * delta  # (11)
         outer = law.outer(phi, q, reference, m, g)
         force = outer.torque + added

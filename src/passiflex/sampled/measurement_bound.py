@@ -21,7 +21,7 @@ from __future__ import annotations
 
 import math
 from types import SimpleNamespace
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import casadi as cs
 
@@ -61,6 +61,20 @@ class Bound(NamedTuple):
     state: dict[str, Any]
 
 
+class ErrorNumbers(Protocol):
+    """The declared errors in symbols, as `error_layout` says."""
+
+    torque_offset: cs.SX
+    torque_scale: cs.SX
+    torque_bandwidth: cs.SX
+    link_resolution: cs.SX
+    noise_deviation: cs.SX
+    noise_hold: cs.SX
+    noise_credit: cs.SX
+    bend: cs.SX
+    period: cs.SX
+
+
 def error_layout(n: int) -> Layout:
     """Return the declared errors of the measurement; 0 stands for none, `UNFILTERED` for no low-pass."""
     return Layout(
@@ -74,7 +88,8 @@ def error_layout(n: int) -> Layout:
             Field("noise_credit", (), "W", "mean power with which it credits the tank"),
             Field("bend", (), "1", "`BEND`; 0 trusts the trapezoid"),
             Field("period", (), "s", "time between two readings without a gap"),
-        )
+        ),
+        ErrorNumbers,
     )
 
 
@@ -119,9 +134,7 @@ def sure_state(n: int) -> Layout:
     return Layout((*fields, Field("sure_q", (n,), "rad", "q")))
 
 
-def booked_bound(
-    y: Measurement, elapsed: cs.SX, first: cs.SX, s: SimpleNamespace, e: SimpleNamespace
-) -> Bound:
+def booked_bound(y: Measurement, elapsed: cs.SX, first: cs.SX, s: Any, e: ErrorNumbers) -> Bound:
     """Return the bound after a reading `elapsed` seconds after the last one.
 
     `s` has the fields of `bound_state` and `sure_state`, and `last_q`, `last_tau_a` of the last period; `e`
@@ -167,14 +180,14 @@ def booked_bound(
     return Bound(total, lowered, {"measurement_bound": total} | state)
 
 
-def sure(now: cs.SX, q: cs.SX, s: SimpleNamespace, state: dict[str, Any]) -> dict[str, Any]:
+def sure(now: cs.SX, q: cs.SX, s: Any, state: dict[str, Any]) -> dict[str, Any]:
     """Return the fields of `sure_state`: those of this period, with the reading q, if `now` is 1."""
     known = state | {"q": q}
     fields = sure_state(q.numel())
     return {f.name: cs.if_else(now, known[f.name[5:]], getattr(s, f.name)) for f in fields}
 
 
-def _constant(moved: cs.SX, work: cs.SX, torques: cs.SX, e: SimpleNamespace) -> cs.SX:
+def _constant(moved: cs.SX, work: cs.SX, torques: cs.SX, e: ErrorNumbers) -> cs.SX:
     """Return what offset, scale and the encoders' steps at both ends are worth over a displacement [J]."""
     steps = e.link_resolution / 2 * torques
     return cs.dot(e.torque_offset, cs.fabs(moved)) + cs.dot(e.torque_scale, cs.fabs(work)) + steps
@@ -191,12 +204,12 @@ def _before_low_pass(tau: cs.SX, last: cs.SX, elapsed: cs.SX, bandwidth: cs.SX) 
     return tau + lag * (tau - last)
 
 
-def _kept(elapsed: cs.SX, e: SimpleNamespace) -> cs.SX:
+def _kept(elapsed: cs.SX, e: ErrorNumbers) -> cs.SX:
     """Return what share of its distance to q the slow q keeps, so that `_way_of_noise` is right for a steady motion."""
     return cs.exp(-cs.sqrt(2) * elapsed / cs.fmax(e.noise_hold, SHORTEST))
 
 
-def _way_of_noise(q: cs.SX, dq: cs.SX, elapsed: cs.SX, s: SimpleNamespace, e: SimpleNamespace) -> cs.SX:
+def _way_of_noise(q: cs.SX, dq: cs.SX, elapsed: cs.SX, s: Any, e: ErrorNumbers) -> cs.SX:
     """Return what the variance of the noise's part in Σw grows by, per variance of the noise [rad²].
 
     By parts the noise of a reading multiplies ½ (q_k+1 − q_k−1). Noise that lasts multiplies the way in that
@@ -208,9 +221,7 @@ def _way_of_noise(q: cs.SX, dq: cs.SX, elapsed: cs.SX, s: SimpleNamespace, e: Si
     return cs.if_else(hold < GAP * elapsed, centred, cs.fmax(lasting, centred))
 
 
-def _between(
-    dq: cs.SX, dtau: cs.SX, elapsed: cs.SX, s: SimpleNamespace, e: SimpleNamespace
-) -> tuple[cs.SX, cs.SX, cs.SX]:
+def _between(dq: cs.SX, dtau: cs.SX, elapsed: cs.SX, s: Any, e: ErrorNumbers) -> tuple[cs.SX, cs.SX, cs.SX]:
     """Return bend [J] and parabola less trapezoid [J] of two readings, and whether there was a gap between them."""
     known = s.step_time > 0
     ratio = cs.if_else(known, elapsed / cs.fmax(s.step_time, SHORTEST), 0)

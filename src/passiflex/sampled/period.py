@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
 from typing import NamedTuple
 
 import casadi as cs
 
-from passiflex.control.law import Stored
+from passiflex.control.law import Gains, Stored
 from passiflex.control.signals import Measurement
 from passiflex.robots.arm import EndEffectorPose
 from passiflex.sampled.measurement_bound import Bound
@@ -38,7 +37,7 @@ class Force(NamedTuple):
     """What is in force after settling: the law's gains or the fallback's, the reference held, and the books."""
 
     now: Stored
-    gains: SimpleNamespace
+    gains: Gains
     latched: cs.SX
     held: EndEffectorPose
     held_stiffness: cs.SX

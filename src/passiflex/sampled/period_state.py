@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
+from typing import Any
 
 import casadi as cs
 
@@ -73,7 +73,7 @@ def period_start(n: int, k: int, at: Rest) -> Remembered:
 
 
 def period_after(
-    r: Read, f: Force, granted: Granted, command: Command, variable: cs.SX, floor: cs.SX, s: SimpleNamespace
+    r: Read, f: Force, granted: Granted, command: Command, variable: cs.SX, floor: cs.SX, s: Any
 ) -> dict[str, cs.SX]:
     """Return their values after a period; `variable` is U(K_x) − U(K_base), `floor` that of the tank."""
     tank = added(f.tank, granted.entry)

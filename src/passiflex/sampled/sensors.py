@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import abc
 from dataclasses import dataclass
-from types import SimpleNamespace
-from typing import NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import casadi as cs
 
@@ -42,6 +41,21 @@ class Reading(NamedTuple):
     state: cs.SX
 
 
+class SensorNumbers(Protocol):
+    """The numbers of the sensors in symbols, as `Sensors.layout` says."""
+
+    torque_scale: cs.SX
+    torque_offset: cs.SX
+    link_offset: cs.SX
+    motor_offset: cs.SX
+    link_resolution: cs.SX
+    motor_resolution: cs.SX
+    velocity_differences: cs.SX
+    velocity_bandwidth: cs.SX
+    torque_bandwidth: cs.SX
+    wrench_bandwidth: cs.SX
+
+
 class AbstractSensorEffect(abc.ABC):
     """What else the readings go through, in their order, as a dead zone or a bias that drifts.
 
@@ -61,7 +75,7 @@ class AbstractSensorEffect(abc.ABC):
         return self.state(at.q.size).zeros()
 
     @abc.abstractmethod
-    def read(self, y: Measurement, elapsed: cs.SX, s: SimpleNamespace) -> Reading:
+    def read(self, y: Measurement, elapsed: cs.SX, s: Any) -> Reading:
         """Return the reading of y, `elapsed` seconds after the last one."""
 
 
@@ -95,7 +109,8 @@ class Sensors:
                 Field("velocity_bandwidth", (), "rad/s", "pole of the low-pass of the differences"),
                 Field("torque_bandwidth", (), "rad/s", "pole of the joint torque sensor"),
                 Field("wrench_bandwidth", (), "rad/s", "pole of the wrench sensor"),
-            )
+            ),
+            SensorNumbers,
         )
 
     @property
@@ -129,7 +144,7 @@ class Sensors:
         return own | {k: v for e in self.effects for k, v in e.start(at).items()}
 
     def read(
-        self, truth: Measurement, torque_noise: cs.SX, elapsed: cs.SX, s: SimpleNamespace, g: SimpleNamespace
+        self, truth: Measurement, torque_noise: cs.SX, elapsed: cs.SX, s: Any, g: SensorNumbers
     ) -> Reading:
         """Return the reading of the truth, `elapsed` seconds after the last one."""
         first = s.started < 1

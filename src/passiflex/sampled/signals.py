@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Generic, NamedTuple, TypeVar
+from typing import NamedTuple, Protocol
 
 import casadi as cs
 
+from passiflex.control.law import Gains
 from passiflex.control.signals import Command, Measurement
 from passiflex.robots.arm import EndEffectorPose
-from passiflex.sampled.tank import TankEntry
+from passiflex.robots.flexible import RobotNumbers
+from passiflex.sampled.actions import ActionNumbers
+from passiflex.sampled.inner_loop import InnerNumbers
+from passiflex.sampled.measurement_bound import ErrorNumbers
+from passiflex.sampled.tank import TankEntry, TankNumbers
 
 
 class Setpoint(NamedTuple):
@@ -69,11 +74,14 @@ class PeriodResult(NamedTuple):
     believed: Measurement
 
 
-P = TypeVar("P")
+class ObserverNumbers(Protocol):
+    """The numbers of the external torque's estimator in symbols."""
+
+    bandwidth: cs.SX
 
 
-class ControlParameters(NamedTuple, Generic[P]):
-    """Everything that is a run-time number of the controller, as layouts or as views of them.
+class ControlNumbers(NamedTuple):
+    """Everything that is a run-time number of the controller, in symbols.
 
     Attributes
     ----------
@@ -87,11 +95,11 @@ class ControlParameters(NamedTuple, Generic[P]):
     errors: `error_layout`, what the sensors may get wrong.
     """
 
-    model: P
-    gains: P
-    fallback: P
-    tank: P
-    actions: P
-    observer: P
-    inner: P
-    errors: P
+    model: RobotNumbers
+    gains: Gains
+    fallback: Gains
+    tank: TankNumbers
+    actions: ActionNumbers
+    observer: ObserverNumbers
+    inner: InnerNumbers
+    errors: ErrorNumbers

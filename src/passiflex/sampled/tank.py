@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import abc
-from types import SimpleNamespace
-from typing import ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple, Protocol
 
 import casadi as cs
 
@@ -60,6 +59,19 @@ class TankEntry(NamedTuple):
     fault: cs.SX
 
 
+class TankNumbers(Protocol):
+    """The numbers of a sampled tank in symbols, as `AbstractTank.layout` says."""
+
+    tank_floor: cs.SX
+    tank_low: cs.SX
+    tank_cap: cs.SX
+    tank_power: cs.SX
+    tank_trip: cs.SX
+    tank_signed: cs.SX
+    tank_fill: cs.SX
+    tank_braking: cs.SX
+
+
 class AbstractTank(abc.ABC):
     """An energy tank with levels, sampled: its `flow`, and a few words on what it does.
 
@@ -86,7 +98,8 @@ class AbstractTank(abc.ABC):
             Field("tank_signed", (), "1", "0: a change of the reference costs |ΔU|; 1: it costs ΔU"),
             Field("tank_fill", (), "1", "α: share of the claimed loss that is credited, if any is"),
             Field("tank_braking", (), "N m s/rad", "α_max: most damping that the tank adds, if it adds any"),
-        )
+        ),
+        TankNumbers,
     )
     kind: ClassVar[str] = ""
     title: ClassVar[str] = ""
@@ -97,33 +110,33 @@ class AbstractTank(abc.ABC):
     falls_back: ClassVar[bool] = False
 
     @abc.abstractmethod
-    def flow(self, flows: PeriodFlows, g: SimpleNamespace) -> cs.SX:
+    def flow(self, flows: PeriodFlows, g: TankNumbers) -> cs.SX:
         """Return what comes in for the period that ends now, out if negative [J]."""
 
-    def settle(self, level: cs.SX, flows: PeriodFlows, g: SimpleNamespace) -> TankEntry:
+    def settle(self, level: cs.SX, flows: PeriodFlows, g: TankNumbers) -> TankEntry:
         """Return the entry for the period that ends now."""
         ok = finite(level, *(getattr(flows, name) for name in self.reads))
         return booked(level, granted=0, flow=self.flow(flows, g), cap=g.tank_cap, ok=ok)
 
-    def pay(self, level: cs.SX, cost: cs.SX, g: SimpleNamespace) -> TankEntry:
+    def pay(self, level: cs.SX, cost: cs.SX, g: TankNumbers) -> TankEntry:
         """Return the entry for a change of the reference or of the stiffness that stores `cost` [J]."""
         if self.charges:
             return paid(level, cost, g)
         return booked(level, granted=0, flow=0, cap=g.tank_cap, ok=finite(level, cost))
 
-    def budget(self, level: cs.SX, elapsed: cs.SX, g: SimpleNamespace) -> cs.SX:
+    def budget(self, level: cs.SX, elapsed: cs.SX, g: TankNumbers) -> cs.SX:
         """Return what may be granted now [J], ≥ 0."""
         return above_floor(level, elapsed, g) if self.gates else cs.SX(UNLIMITED)
 
-    def braking(self, level: cs.SX, speed_squared: cs.SX, elapsed: cs.SX, g: SimpleNamespace) -> cs.SX:
+    def braking(self, level: cs.SX, speed_squared: cs.SX, elapsed: cs.SX, g: TankNumbers) -> cs.SX:
         """Return the damping [N m s/rad] that the tank adds to the motors in this period, ≥ 0."""
         return cs.SX(0)
 
-    def stiffness_share(self, level: cs.SX, g: SimpleNamespace) -> cs.SX:
+    def stiffness_share(self, level: cs.SX, g: TankNumbers) -> cs.SX:
         """Return how much of the stiffness above the base one may act, 0..1."""
         return cs.SX(1)
 
-    def valve(self, level: cs.SX, g: SimpleNamespace) -> cs.SX:
+    def valve(self, level: cs.SX, g: TankNumbers) -> cs.SX:
         """Return β(T): 0 at T_min, 1 from T_low on."""
         return smoothstep((level - g.tank_floor) / (g.tank_low - g.tank_floor))
 
@@ -158,7 +171,7 @@ def added(first: TankEntry, second: TankEntry) -> TankEntry:
     return TankEntry(second.level, *sums)
 
 
-def paid(level: cs.SX, cost: cs.SX, g: SimpleNamespace) -> TankEntry:
+def paid(level: cs.SX, cost: cs.SX, g: TankNumbers) -> TankEntry:
     """Return the entry of a cost: ΔU if the tank is signed, |ΔU| as the paper has it otherwise."""
     signed, ok = g.tank_signed > 0, finite(level, cost)
     granted = cs.if_else(signed, cs.fmax(cost, 0), cs.fabs(cost))
@@ -166,7 +179,7 @@ def paid(level: cs.SX, cost: cs.SX, g: SimpleNamespace) -> TankEntry:
     return booked(level, granted=granted, flow=returned, cap=g.tank_cap, ok=ok)
 
 
-def above_floor(level: cs.SX, elapsed: cs.SX, g: SimpleNamespace) -> cs.SX:
+def above_floor(level: cs.SX, elapsed: cs.SX, g: TankNumbers) -> cs.SX:
     """Return min(T − T_min, P_max Δt), at least 0 [J]; 0 if one of the two is no number."""
     most = cs.fmax(cs.fmin(level - g.tank_floor, g.tank_power * elapsed), 0)
     return cs.if_else(finite(level, elapsed), most, 0)

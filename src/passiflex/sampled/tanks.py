@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
 from typing import ClassVar, final
 
 import casadi as cs
 
-from passiflex.sampled.tank import AbstractTank, PeriodFlows
+from passiflex.sampled.tank import AbstractTank, PeriodFlows, TankNumbers
 
 
 @final
@@ -25,7 +24,7 @@ class PortTank(AbstractTank):
     measures: ClassVar[bool] = True
     falls_back: ClassVar[bool] = True
 
-    def flow(self, flows: PeriodFlows, g: SimpleNamespace) -> cs.SX:
+    def flow(self, flows: PeriodFlows, g: TankNumbers) -> cs.SX:
         """Return −ΔS − w."""
         return -flows.storage_change - flows.port_energy
 
@@ -42,7 +41,7 @@ class PaperTank(AbstractTank):
     title: ClassVar[str] = "paper's tank"
     reads: ClassVar[tuple[str, ...]] = ("claimed_loss",)
 
-    def flow(self, flows: PeriodFlows, g: SimpleNamespace) -> cs.SX:
+    def flow(self, flows: PeriodFlows, g: TankNumbers) -> cs.SX:
         """Return α P_D Δt."""
         return g.tank_fill * flows.claimed_loss
 
@@ -64,11 +63,11 @@ class TimeDomainTank(AbstractTank):
     gates: ClassVar[bool] = False
     measures: ClassVar[bool] = True
 
-    def flow(self, flows: PeriodFlows, g: SimpleNamespace) -> cs.SX:
+    def flow(self, flows: PeriodFlows, g: TankNumbers) -> cs.SX:
         """Return −w."""
         return -flows.port_energy
 
-    def braking(self, level: cs.SX, speed_squared: cs.SX, elapsed: cs.SX, g: SimpleNamespace) -> cs.SX:
+    def braking(self, level: cs.SX, speed_squared: cs.SX, elapsed: cs.SX, g: TankNumbers) -> cs.SX:
         """Return α = min(−E / (Δt |φ̇|²), α_max) while E < 0."""
         debt = cs.fmax(-level, 0)
         work = elapsed * speed_squared  # per unit of damping
@@ -91,11 +90,11 @@ class VariableStiffnessTank(AbstractTank):
     charges: ClassVar[bool] = False
     gates: ClassVar[bool] = False
 
-    def flow(self, flows: PeriodFlows, g: SimpleNamespace) -> cs.SX:
+    def flow(self, flows: PeriodFlows, g: TankNumbers) -> cs.SX:
         """Return α ẋᵀD_xẋ Δt and the work on the variable part."""
         return g.tank_fill * flows.claimed_cartesian_loss + flows.variable_spring_work
 
-    def stiffness_share(self, level: cs.SX, g: SimpleNamespace) -> cs.SX:
+    def stiffness_share(self, level: cs.SX, g: TankNumbers) -> cs.SX:
         """Return β(T)."""
         return self.valve(level, g)
 
