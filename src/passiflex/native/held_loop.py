@@ -147,24 +147,9 @@ class HeldLoop:
         SizeError, ValueRangeError
             For an argument of the wrong shape or outside its range.
         """
-        rows = np.ascontiguousarray(rows, dtype=float)
-        timing = np.ascontiguousarray(timing, dtype=float)
-        if rows.ndim != 2 or rows.shape[1] != self.n_w:
-            raise SizeError("rows", got=rows.shape, needs=f"shape (samples, {self.n_w})")
-        if timing.shape != (len(rows), 2):
-            raise SizeError("timing", got=timing.shape, needs=f"shape ({len(rows)}, 2)")
-        for name, value in (("period", period), ("longest", longest)):
-            if not (value > 0 and math.isfinite(value)):
-                raise ValueRangeError(name, got=value, needs="a positive time in s")
-        if record_every < 1 or record_every % 1:
-            raise ValueRangeError("record_every", got=record_every, needs="a whole number, at least 1")
+        _require_steps(period, longest, record_every)
         record_every = int(record_every)
-        if timing.size and not 0 <= timing[:, 0].min() <= timing[:, 0].max() < (LONGEST_LINE - 2) * period:
-            raise ValueRangeError(
-                "delay of a command",
-                got=f"{timing[:, 0].min()} to {timing[:, 0].max()} s",
-                needs=f"0 to {LONGEST_LINE - 3} periods",
-            )
+        rows, timing = self._driven(rows, timing, period)
         width = self.n_x + self.n_q + self.n_c + self.n_u + self.n_z
         out = np.full((-(-len(rows) // record_every), width), np.nan)
         sizes = (self.n_x, self.n_q, self.n_c, self.n_line, self.n_z, self.n_m)
@@ -210,6 +195,22 @@ class HeldLoop:
             *(ctypes.byref(f) if f is not None else None for f in callables), address(sizes), *arrays,
             call.first, len(call.rows), *call[11:15], address(call.out), address(scratch),
         )  # fmt: skip
+
+    def _driven(self, rows: ArrayLike, timing: ArrayLike, period: float) -> tuple[Array, Array]:
+        """Return rows and timing as `advance` needs them."""
+        rows = np.ascontiguousarray(rows, dtype=float)
+        timing = np.ascontiguousarray(timing, dtype=float)
+        if rows.ndim != 2 or rows.shape[1] != self.n_w:
+            raise SizeError("rows", got=rows.shape, needs=f"shape (samples, {self.n_w})")
+        if timing.shape != (len(rows), 2):
+            raise SizeError("timing", got=timing.shape, needs=f"shape ({len(rows)}, 2)")
+        if timing.size and not 0 <= timing[:, 0].min() <= timing[:, 0].max() < (LONGEST_LINE - 2) * period:
+            raise ValueRangeError(
+                "delay of a command",
+                got=f"{timing[:, 0].min()} to {timing[:, 0].max()} s",
+                needs=f"0 to {LONGEST_LINE - 3} periods",
+            )
+        return rows, timing
 
     def _in_machine(self, call: _Call) -> int:
         (
@@ -281,6 +282,15 @@ def _fit(plant: cs.Function, control: cs.Function) -> bool:
         and control.size1_in(1) == control.size1_out(0)
         and 0 <= plant.size1_in(1) - control.size1_out(1) <= control.size1_in(2)
     )
+
+
+def _require_steps(period: float, longest: float, record_every: int) -> None:
+    """Refuse times that are none."""
+    for name, value in (("period", period), ("longest", longest)):
+        if not (value > 0 and math.isfinite(value)):
+            raise ValueRangeError(name, got=value, needs="a positive time in s")
+    if record_every < 1 or record_every % 1:
+        raise ValueRangeError("record_every", got=record_every, needs="a whole number, at least 1")
 
 
 def _column(name: str, value: ArrayLike, size: int) -> Array:

@@ -162,22 +162,10 @@ class LaneLoop:
             For an argument of the wrong shape or outside its range.
         """
         w, n = self.width, len(inputs.drawn)
-        _require_range("period", period, period > 0 and np.isfinite(period), "a positive time in s")
-        _require_range("longest", longest, (longest > 0) & (longest < np.inf), "positive times in s")
-        _require_range(
-            "record_every",
-            record_every,
-            record_every >= 1 and not record_every % 1,
-            "a whole number, at least 1",
-        )
+        _require_steps(period, longest, record_every)
         record_every = int(record_every)
         _require_range("kept", kept, (kept >= 0) & (kept < self.instant["row"].stop), "numbers of a sample")
-        late, most = inputs.timing[:, 0], (LONGEST_LINE - 2) * period
-        _require_range(
-            "delay of a command", late, (late >= 0) & (late < most), f"0 to {LONGEST_LINE - 3} periods"
-        )
-        for change in inputs.changes:
-            _require_range("lane of a change", change.lane, 0 <= change.lane < w, f"below {w}")
+        _require_inputs(inputs, period, w)
         arrays = {
             "y": aligned("y", state.y, (self.n_x + self.n_q, w)),
             "c": aligned("controller", state.controller, (self.n_c, w)),
@@ -195,21 +183,25 @@ class LaneLoop:
             "longest": aligned("longest", longest, (w,)),
             "out": aligned("out", None, (-(-n // record_every), kept.size, w)),
         }
-        changes = sorted(inputs.changes, key=lambda change: change.period)
-        scheduled = np.zeros((len(changes), self.n_scheduled))
-        for i, c in enumerate(changes):
-            scheduled[i] = aligned("scheduled in a change", c.scheduled, (self.n_scheduled,))
-        when = np.array([(c.period, c.lane, i) for i, c in enumerate(changes)], dtype=np.int64)
+        when, scheduled = self._changes(inputs)
         kept = np.ascontiguousarray(kept, dtype=np.int64)
         completed, whole = np.zeros(w, dtype=np.int64), np.zeros(w, dtype=np.int64)
         run = _Run(
-            inputs.first, n, n - last, record_every, len(changes), kept.size, period,
+            inputs.first, n, n - last, record_every, len(when), kept.size, period,
             changes=address(when), scheduled_values=address(scheduled), kept=address(kept),
             completed=address(completed), whole=address(whole), **{name: address(a) for name, a in arrays.items()},
         )  # fmt: skip
         self._routine(ctypes.byref(run))
         after = LaneState(*(arrays[name] for name in ("y", "c", "z", "line", "scheduled", "w")))
         return LaneSamples(arrays["out"], completed, whole, after)
+
+    def _changes(self, inputs: LaneInputs) -> tuple[NDArray[np.int64], Array]:
+        """Return period, lane and number of each change in order of time, and what is scheduled from there on."""
+        changes = sorted(inputs.changes, key=lambda change: change.period)
+        scheduled = np.zeros((len(changes), self.n_scheduled))
+        for i, c in enumerate(changes):
+            scheduled[i] = aligned("scheduled in a change", c.scheduled, (self.n_scheduled,))
+        return np.array([(c.period, c.lane, i) for i, c in enumerate(changes)], dtype=np.int64), scheduled
 
     def _source(self, f: LaneFunctions, width: int | None) -> str:
         sizes = {
@@ -221,6 +213,24 @@ class LaneLoop:
         lines += [f"#define {part.upper()} {g.name()}_in_lanes" for part, g in f.there.items()]
         lines.append(f"#define N_M {self.n_m}")
         return "\n".join((lane_source(list(f.there.values()), width), *lines, c_source("lane_loop.c")))
+
+
+def _require_steps(period: float, longest: Array, record_every: int) -> None:
+    """Refuse times that are none."""
+    _require_range("period", period, period > 0 and np.isfinite(period), "a positive time in s")
+    _require_range("longest", longest, (longest > 0) & (longest < np.inf), "positive times in s")
+    whole = record_every >= 1 and not record_every % 1
+    _require_range("record_every", record_every, whole, "a whole number, at least 1")
+
+
+def _require_inputs(inputs: LaneInputs, period: float, width: int) -> None:
+    """Refuse commands that are too late, and changes in lanes that there are not."""
+    late, most = inputs.timing[:, 0], (LONGEST_LINE - 2) * period
+    _require_range(
+        "delay of a command", late, (late >= 0) & (late < most), f"0 to {LONGEST_LINE - 3} periods"
+    )
+    for change in inputs.changes:
+        _require_range("lane of a change", change.lane, 0 <= change.lane < width, f"below {width}")
 
 
 def _require_range(

@@ -56,11 +56,7 @@ def resolve(scenario: Scenario, robot: FlexibleJointRobot | None = None) -> Prob
         scenario = scenario.model_copy(update={"robot": f"{robot.name}, changed in memory"})
     law = scenario.law.build(robot)
     q = _start(scenario, robot)
-    described = robot.nominal(STANDARD_GRAVITY if law.gravity.in_model else (0.0, 0.0, 0.0))
-    arm = robot.arm.chain.with_tool(scenario.tool.position, scenario.tool.rotation_vector)
-    described |= {"tool_position": arm.tip_xyz, "tool_rotation": arm.tip_rotation}
-    plant = _scaled(described, "deviations", scenario.deviations, robot)
-    model = _scaled(described, "model_errors", scenario.model_errors, robot)
+    described, plant, model = _robot_numbers(scenario, law)
     at_start = posture(robot, q, plant)
     _refuse_too_few(law)
     _refuse_singular(scenario, held_jacobian(law.task, at_start))
@@ -68,28 +64,18 @@ def resolve(scenario: Scenario, robot: FlexibleJointRobot | None = None) -> Prob
     if law.gravity.searches and law.shapes:
         _refuse_soft(robot, q, model, gains["shaped_stiffness"])
     theta = q + at_start.gravity_torque / plant["joint_stiffness"]
-    shaped = q + model["joint_stiffness"] / gains.get("shaped_stiffness", model["joint_stiffness"]) * (
-        theta - q
-    )
-    home = posture(robot, shaped, model).pose
+    softer = model["joint_stiffness"] / gains.get("shaped_stiffness", model["joint_stiffness"])
+    home = posture(robot, q + softer * (theta - q), model).pose
     # The law's own damping goes by the robot as described; its weight is the true one.
     start = at_start._replace(mass_matrix=posture(robot, q, described).mass_matrix)
     known = Known(elements_of(scenario, robot), plant, model, q, start)
-    common: dict[str, Any] = {
-        "name": scenario.name,
+    common: dict[str, Any] = _as_written(scenario) | {
         "law": law,
         "elements": known.elements,
         "q": q,
         "theta": theta,
         "home": home,
-        "tank": tank_start(scenario),
         "events": timeline(scenario, home),
-        "noise": Noise(scenario.noise.torque_variance, scenario.noise.hold) if scenario.noise else None,
-        "duration": scenario.duration,
-        "output_interval": scenario.output_interval,
-        "tolerance": scenario.tolerance,
-        "seed": scenario.seed,
-        "text": scenario.to_yaml(),
     }
     if scenario.control is not None:
         return SampledProblem(**common, **sampled_parts(scenario, scenario.control, law, gains, known))
@@ -110,6 +96,20 @@ def _checked(scenario: Scenario) -> Scenario:
         return Scenario.model_validate(data)
     except ValidationError:  # with the line and column that a mistake has in the scenario's own text
         return parse_scenario(scenario.to_yaml(), source=f"scenario {scenario.name!r}")
+
+
+def _as_written(scenario: Scenario) -> dict[str, Any]:
+    """Return what a problem has of its scenario as it is."""
+    return {
+        "name": scenario.name,
+        "tank": tank_start(scenario),
+        "noise": Noise(scenario.noise.torque_variance, scenario.noise.hold) if scenario.noise else None,
+        "duration": scenario.duration,
+        "output_interval": scenario.output_interval,
+        "tolerance": scenario.tolerance,
+        "seed": scenario.seed,
+        "text": scenario.to_yaml(),
+    }
 
 
 def _start(scenario: Scenario, robot: FlexibleJointRobot) -> Array:
@@ -185,6 +185,16 @@ def _refuse_soft(robot: FlexibleJointRobot, q: Array, model: dict[str, Array], K
             needs=f"at most {SLOWEST_CONTRACTION:.0%}, so that its fixed point is found",
             try_="a stiffer shaped_stiffness, or gravity: motor",
         )
+
+
+def _robot_numbers(scenario: Scenario, law: AbstractLaw) -> tuple[dict[str, Array], ...]:
+    """Return the robot's numbers as they are described, as they are, and as the law believes them."""
+    robot = law.robot
+    described = robot.nominal(STANDARD_GRAVITY if law.gravity.in_model else (0.0, 0.0, 0.0))
+    arm = robot.arm.chain.with_tool(scenario.tool.position, scenario.tool.rotation_vector)
+    described |= {"tool_position": arm.tip_xyz, "tool_rotation": arm.tip_rotation}
+    plant = _scaled(described, "deviations", scenario.deviations, robot)
+    return described, plant, _scaled(described, "model_errors", scenario.model_errors, robot)
 
 
 def _scaled(

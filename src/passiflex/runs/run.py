@@ -22,6 +22,7 @@ from passiflex.origin import package_version, source_commit
 from passiflex.problems.own_parts import parts_said
 from passiflex.problems.problem import SampledProblem
 from passiflex.problems.unbooked import UNKNOWN, unbooked
+from passiflex.robots.flexible import FlexibleJointRobot
 from passiflex.runs.run_attributes import renamed, wrong_attributes, wrong_units
 from passiflex.runs.run_bounds import require_bounded
 from passiflex.runs.run_file import FORMAT, cut_short, defects, foreign, require_file, unreadable
@@ -206,20 +207,32 @@ def assemble(
     for f in noted.layout:
         about = {"units": f.unit, "long_name": f.meaning}
         variables[f.name] = (("joint",) * len(f.shape), noted.values[f.name], about)
-    n, robot = problem.law.robot.n, problem.law.robot
+    robot = problem.law.robot
+    variables |= _limits(robot)
+    used = {d for dims, *_ in variables.values() for d in dims}
+    coordinates: dict[str, Any] = {k: v for k, v in COORDINATES.items() if k in used}
+    coordinates["joint"] = np.arange(1, robot.n + 1)
+    coordinates["time"] = ("time", time, {"units": "s", "long_name": "time"})
+    attributes = _attributes(problem) | {"events": json.dumps(events), "failure": failure}
+    return Run(xr.Dataset(variables, coordinates, attributes))
+
+
+def _limits(robot: FlexibleJointRobot) -> dict[str, Any]:
+    """Return the robot's limits as variables of a run."""
     angle, speed, torque = robot.arm.chain.joint_units
-    for name, limit, unit in (
+    limits = (
         ("torque_limit", robot.torque_limit, torque),
         ("velocity_limit", robot.velocity_limit, speed),
         ("lower_position_limit", robot.position_limit[:, 0], angle),
         ("upper_position_limit", robot.position_limit[:, 1], angle),
-    ):
-        variables[name] = (("joint",), limit, {"units": unit, "long_name": "of the robot"})
-    used = {d for dims, *_ in variables.values() for d in dims}
-    coordinates: dict[str, Any] = {k: v for k, v in COORDINATES.items() if k in used}
-    coordinates["joint"] = np.arange(1, n + 1)
-    coordinates["time"] = ("time", time, {"units": "s", "long_name": "time"})
-    attributes = {
+    )
+    return {name: (("joint",), v, {"units": unit, "long_name": "of the robot"}) for name, v, unit in limits}
+
+
+def _attributes(problem: Problem) -> dict[str, Any]:
+    """Return what a run says of its problem."""
+    robot = problem.law.robot
+    return {
         "format": FORMAT,
         "name": problem.name,
         "robot": robot.name,
@@ -235,12 +248,9 @@ def assemble(
         "control_period": problem.period if isinstance(problem, SampledProblem) else 0.0,
         "version": package_version(),
         "commit": source_commit(),
-        "events": json.dumps(events),
-        "failure": failure,
         "duration": problem.duration,
         "tolerance": problem.tolerance,
     }
-    return Run(xr.Dataset(variables, coordinates, attributes))
 
 
 def _description(problem: Problem) -> str:

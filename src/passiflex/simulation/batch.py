@@ -14,7 +14,7 @@ from passiflex.errors import NameUnknownError, SimulationError
 from passiflex.loops.compiled import CompiledSampledLoop, compiled_sampled_loop, structure
 from passiflex.loops.recorded import sample_parts
 from passiflex.loops.sampled_loop import SampledLoop
-from passiflex.loops.witness import Noted
+from passiflex.loops.witness import Noted, Witness
 from passiflex.native import Change, LaneFunctions, LaneInputs, LaneLoop, find_compiler
 from passiflex.problems.problem import Problem, SampledProblem
 from passiflex.problems.unbooked import unbooked
@@ -148,13 +148,8 @@ def _advance(
     s = problems[0]
     every = round(problems[0].output_interval / s.period)
     columns, shapes = _columns(lanes, compiled.loop, keep)
-    numbers = [charged(p) for p in filled]
-    p_plant = np.stack([n.plant for n in numbers], axis=1)
-    p_control = np.stack([n.numbers for n in numbers], axis=1)
     witness = compiled.loop.witness
-    p_watch = np.concatenate(
-        [p_control, np.stack([witness.numbers(p.law.robot, p.tank.initial) for p in filled], axis=1)]
-    )
+    p_plant, p_control, p_watch = _lane_numbers(filled, witness)
     state = lanes.start([start(p, compiled) for p in filled])
     told = [schedule(p, compiled.loop.period) for p in filled]
     chances = [Chance(p, compiled.loop.period) for p in filled]
@@ -199,6 +194,15 @@ def _advance(
         )
         for lane, p in enumerate(problems)
     ]
+
+
+def _lane_numbers(problems: list[SampledProblem], witness: Witness) -> tuple[Array, Array, Array]:
+    """Return the numbers of plant, control and watch, a column for each lane."""
+    numbers = [charged(p) for p in problems]
+    plant = np.stack([n.plant for n in numbers], axis=1)
+    control = np.stack([n.numbers for n in numbers], axis=1)
+    watched = np.stack([witness.numbers(p.law.robot, p.tank.initial) for p in problems], axis=1)
+    return plant, control, np.concatenate([control, watched])
 
 
 def _changes(told: list[list[Scheduled]], begin: int, end: int) -> list[Change]:

@@ -9,6 +9,7 @@ from typing import Any, Literal, NamedTuple
 
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
+from pydantic_core import ErrorDetails
 
 from passiflex.errors import nearest
 from passiflex.texts.mistakes import Mistakes
@@ -68,22 +69,27 @@ def explained(error: ValidationError, data: Any, root: Model) -> Iterator[tuple[
             yield (*place, tag), word(ctx["tag"], re.findall(r"'([^']*)'", ctx["expected_tags"])), False
         elif kind == "literal_error":
             yield place, word(e["input"], re.findall(r"'([^']*)'", ctx["expected"])), False
-        elif kind in ("model_type", "model_attributes_type", "dict_type"):
-            needs = f"a mapping with {', '.join(names)}" if names else "a mapping"
-            yield place, f"expected {needs}; got {shown(e['input'])}", False
-        elif kind == "tuple_type":
-            yield place, f"expected a list; got {shown(e['input'])}", False
-        elif kind.startswith("int") or kind == "greater_than_equal":
-            least = _least(e["loc"], root)
-            yield place, f"expected a whole number, ≥ {least}; got {shown(e['input'])}", False
-        elif kind == "string_type":
-            yield place, f"expected text; got {shown(e['input'])}; try quotes around it", False
-        elif kind == "string_too_short":
-            yield place, f"expected text; got {shown(e['input'])}", False
-        elif kind == "string_pattern_mismatch":
-            yield place, f"expected letters, digits, and any of _ . -; got {shown(e['input'])}", False
         else:
-            yield place, f"{e['msg'][0].lower()}{e['msg'][1:]}; got {shown(e['input'])}", False
+            yield place, _of_another_kind(e, names, root), False
+
+
+def _of_another_kind(e: ErrorDetails, names: Iterable[str], root: Model) -> str:
+    """Return the message for a value of a kind that its entry does not take."""
+    kind, got = e["type"], shown(e["input"])
+    if kind in ("model_type", "model_attributes_type", "dict_type"):
+        needs = f"a mapping with {', '.join(names)}" if names else "a mapping"
+        return f"expected {needs}; got {got}"
+    if kind == "tuple_type":
+        return f"expected a list; got {got}"
+    if kind.startswith("int") or kind == "greater_than_equal":
+        return f"expected a whole number, ≥ {_least(e['loc'], root)}; got {got}"
+    if kind == "string_type":
+        return f"expected text; got {got}; try quotes around it"
+    if kind == "string_too_short":
+        return f"expected text; got {got}"
+    if kind == "string_pattern_mismatch":
+        return f"expected letters, digits, and any of _ . -; got {got}"
+    return f"{e['msg'][0].lower()}{e['msg'][1:]}; got {got}"
 
 
 def told(error: ValidationError, data: Any, root: Model) -> list[str]:
