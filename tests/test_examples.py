@@ -24,7 +24,7 @@ SAYS = {
     "look_at_it": r"worst\.html",
     "own_tank": "passive",
     "own_element": r"\de-\d\d",
-    "own_law": "passive",
+    "own_law": r"up by (4\.9|5\.0)\d cm of 5 cm; the run was passive",
     "own_sensor": r"passive 0\.\d+",
     "own_motion": r"passive 0\.0[67]",
 }

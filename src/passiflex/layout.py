@@ -14,7 +14,7 @@ from functools import cached_property
 from inspect import get_annotations
 from math import prod
 from types import SimpleNamespace
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, NoReturn
 
 import casadi as cs
 import numpy as np
@@ -50,6 +50,13 @@ class Field(NamedTuple):
     def size(self) -> int:
         """Return the number of scalars."""
         return prod(self.shape)
+
+
+class View(SimpleNamespace):
+    """Named symbolic views of a vector; of a name that there is not it says which there are."""
+
+    def __getattr__(self, name: str) -> NoReturn:
+        raise AttributeError(f"no {name!r}; there are {', '.join(vars(self)) or 'none'}")
 
 
 class Signal(NamedTuple):
@@ -136,7 +143,7 @@ class Layout:
         for f in self.fields:
             part = vector[self.slices[f.name]]
             out[f.name] = cs.reshape(part, f.shape[1], f.shape[0]).T if len(f.shape) == 2 else part
-        return SimpleNamespace(**out)
+        return View(**out)
 
     def stack(self, values: Mapping[str, Any]) -> cs.SX:
         """Return the flat symbolic vector of named expressions."""

@@ -114,7 +114,11 @@ def audit(run: Path, /) -> int:
     console.print(f"margin: {result.margin:.6g} J, integration error {result.integration_error:.1e} J")
     if not result.every_step:
         console.print("judged by the rows of the file alone: what happened between them was not noted")
-    if result.books_error > max(10 * result.integration_error, 1e-6):
+    if result.ledger_residual > max(10 * result.integration_error, WORTH_A_WORD):
+        console.print(
+            f"what touches the robot gives or takes {result.ledger_residual:.2e} J that it does not declare"
+        )
+    if result.books_error > max(10 * result.integration_error, WORTH_A_WORD):
         console.print(_wrong_books(read, result))
     if read.sampled:
         _print_control(read)

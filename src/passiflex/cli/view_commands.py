@@ -85,17 +85,23 @@ def export(
     /,
     *,
     to: Annotated[
-        Literal["rrd", "mcap", "csv"],
-        cyclopts.Parameter(help="Rerun; ROS 2 messages for Foxglove and PlotJuggler; text"),
+        str,
+        cyclopts.Parameter(
+            help="rrd, Rerun; mcap, ROS 2 messages for Foxglove and PlotJuggler; csv, text; or what "
+            "another package brings"
+        ),
     ],
     out: Annotated[
         Path | None, cyclopts.Parameter(help="file to write; without it RUN.rrd, .mcap, .csv")
     ] = None,
 ) -> int:
     """Write a run for another program: Rerun, Foxglove, PlotJuggler, or anything that reads tables."""
-    from passiflex.exports import export_run
+    from passiflex.errors import NameUnknownError
+    from passiflex.exports import export_run, formats
 
     with timed():
+        if f".{to}" not in (known := formats()):
+            raise NameUnknownError("kind of file", to, [ending.removeprefix(".") for ending in known])
         target = _target(out, f".{to}", (f".{to}",), run)
         (read,) = _read(run)
         console.print(f"wrote {export_run(read.run, target)}")

@@ -18,6 +18,7 @@ from passiflex.control.null_space import null_space_contribution, null_space_dam
 from passiflex.control.signals import Command, LawEnergy, Measurement, Reference, Stored
 from passiflex.control.task import AbstractTask, PoseTask
 from passiflex.layout import Field, Layout
+from passiflex.robots.arm import EndEffectorPose
 from passiflex.robots.flexible import FlexibleJointRobot, RobotNumbers
 from passiflex.robots.linear_algebra import gram, solve_spd
 
@@ -68,6 +69,8 @@ class AbstractLaw(abc.ABC):
     has_tank: bool
     shapes: bool
     """Whether it gives the joints another stiffness and the motors another inertia."""
+    unbooked: str = ""
+    """What its books miss by its kind, in words."""
 
     @property
     def structure(self) -> Hashable:
@@ -96,6 +99,10 @@ class AbstractLaw(abc.ABC):
     @abc.abstractmethod
     def stored(self, y: Measurement, m: RobotNumbers, g: Any) -> Stored:
         """Return the shaped motors and what they store beside the Cartesian spring."""
+
+    def potential(self, at: Stored, reference: EndEffectorPose, stiffness: cs.SX) -> cs.SX:
+        """Return what its Cartesian spring stores [J]: that of the task unless a law has another."""
+        return self.task.potential(at.pose, reference, stiffness)
 
     @abc.abstractmethod
     def posture_at_rest(self, q: Array, theta: Array, K: Array, gains: Mapping[str, ArrayLike]) -> Array:

@@ -20,6 +20,9 @@ from passiflex.robots.arm import SerialArm
 from passiflex.robots.flexible import FlexibleJointRobot, RobotNumbers
 from passiflex.robots.linear_algebra import solve_spd
 
+SHAPED = "inertia shaped by the law"
+"""What it does that no storage of its own accounts for."""
+
 
 class RigidGains(Gains, Protocol):
     """The gains of the rigid law, as its `layout` says."""
@@ -49,6 +52,7 @@ class RigidImpedanceLaw(AbstractLaw):
     gravity: AbstractGravity = RobotGravity()
     has_tank = False
     shapes = False
+    unbooked = SHAPED
 
     @property
     def structure(self) -> Hashable:

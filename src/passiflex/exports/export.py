@@ -6,7 +6,7 @@ from collections.abc import Callable
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 
-from passiflex.errors import NameUnknownError
+from passiflex.errors import NameUnknownError, ValueRangeError
 from passiflex.exports.csv_file import write_csv
 from passiflex.exports.mcap_file import write_mcap
 from passiflex.exports.rrd_file import write_rrd
@@ -25,13 +25,24 @@ GROUP = "passiflex.exports"
 
 def formats() -> dict[str, Callable[[Run, Path], None]]:
     """Return what writes each kind of file: ours, and those of other packages that are installed."""
-    others = {e.name: e for e in entry_points(group=GROUP) if e.name not in FORMATS}
-    return FORMATS | {ending: _loaded(e) for ending, e in others.items()}
+    others = {f".{e.name.removeprefix('.')}": e for e in entry_points(group=GROUP)}
+    return {ending: _loaded(e) for ending, e in others.items()} | FORMATS
 
 
 def _loaded(point: EntryPoint) -> Callable[[Run, Path], None]:
     """Return what an entry point names, imported when a run is written."""
-    return lambda run, path: point.load()(run, path)
+
+    def write(run: Run, path: Path) -> None:
+        try:
+            found = point.load()
+        except (ImportError, AttributeError) as error:
+            what = f"the entry point {point.name!r} of {GROUP} names nothing"
+            raise ValueRangeError(
+                what, got=f"{point.value}: {error}", needs="a function of run and path"
+            ) from None
+        found(run, path)
+
+    return write
 
 
 def export_run(run: Run, path: str | Path) -> Path:

@@ -197,7 +197,7 @@ class ClosedLoop:
         )
         valve = self.tank.valve(s.tank_energy, tank) if law.has_tank else cs.SX(1)
         reference = reference_at(s.clock, valve, inputs).pose
-        storage = stored.energy + law.task.potential(stored.pose, reference, gains.stiffness)
+        storage = stored.energy + law.potential(stored, reference, gains.stiffness)
         kinetic, potential = arm.kinetic_energy(s.q, s.dq, plant), arm.potential_energy(s.q, plant)
         carried = arm.potential_energy(s.q, model)
         held = kinetic + potential + storage + (s.tank_energy if law.has_tank else 0)

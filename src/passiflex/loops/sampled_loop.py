@@ -23,7 +23,7 @@ from passiflex.sampled.controller import SampledController
 from passiflex.sampled.motors import limit_layout, limited
 from passiflex.sampled.rest import Rest
 from passiflex.sampled.sensors import AbstractSensorEffect, Sensors
-from passiflex.sampled.signals import ControlNumbers, PeriodResult, Setpoint
+from passiflex.sampled.signals import ControlParameters, PeriodResult, Setpoint
 
 AT_ONCE = 1e-7
 """Two instants closer than this are one [s], after millions of periods; a law claims a level when it reads."""
@@ -134,7 +134,7 @@ class SampledLoop:
             w.desired_damping,
             w.feedforward,
         )
-        numbers = ControlNumbers(**{part: views[part] for part in ControlNumbers._fields})
+        numbers = ControlParameters(**{part: views[part] for part in ControlParameters._fields})
         start = self.sensors.state.size
         own = memory[start : start + self.controller.state.size]
         result = self.controller.step(y, setpoint, w.elapsed, c.applied_torque, own, numbers)

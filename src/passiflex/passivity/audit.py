@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
 
+from passiflex.control.rigid import SHAPED
 from passiflex.errors import ArgumentError
 from passiflex.loops.witness import TERMS
 from passiflex.passivity.extremes import Extremes, available_energy, extremes
@@ -19,7 +20,7 @@ from passiflex.passivity.ledger import (
     motor_side_storage,
     robot_balance,
 )
-from passiflex.problems.unbooked import SHAPED, listed
+from passiflex.problems.unbooked import listed
 
 Verdict = Literal["passive", "violated", "inconclusive"]
 
@@ -63,7 +64,7 @@ class Audit:
     unbooked: str
     every_step: bool
     remedy: str
-    balances: tuple[Balance, ...]
+    balances: tuple[Balance, ...] = field(repr=False)
 
     @property
     def overdraft(self) -> float:

@@ -4,21 +4,26 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping, Sequence
-from types import SimpleNamespace
 from typing import Any
 
-import casadi as cs
 from numpy.typing import ArrayLike
 
 from passiflex.control.law import AbstractLaw
-from passiflex.elements import AbstractElement, Effect, Touch
+from passiflex.elements import AbstractElement
 from passiflex.errors import ArgumentError, ValueRangeError
 from passiflex.loops.closed_loop import ClosedLoop
 from passiflex.loops.plant import Plant
 from passiflex.loops.recorded import instant_parts, sample_parts
+from passiflex.problems.own_part_checks import (
+    check_element,
+    check_law,
+    check_motion,
+    check_sensor,
+    check_storage,
+    check_tank,
+)
 from passiflex.problems.problem import Problem, SampledProblem
 from passiflex.problems.timeline import with_motions
-from passiflex.robots.flexible import RobotState
 from passiflex.sampled.sensors import AbstractSensorEffect
 from passiflex.sampled.tank import AbstractTank
 from passiflex.scenarios.reference import AbstractReferenceEvent
@@ -113,6 +118,7 @@ def _with_law(problem: Problem, law: AbstractLaw, gains: dict[str, Any]) -> Prob
     if law.robot is not problem.law.robot:
         needs = f"that of the scenario, FlexibleJointRobot.load({problem.law.robot.name!r})"
         raise ValueRangeError("the law is for another robot", got=law.robot.name, needs=needs)
+    check_law(law, problem)
     own = {f.name for f in law.layout}
     before, numbers = problem.parts, problem.numbers
     values: dict[str, dict[str, Any]] = {part: before.unpack(part, numbers) for part in before.layouts}
@@ -126,7 +132,9 @@ def _with_law(problem: Problem, law: AbstractLaw, gains: dict[str, Any]) -> Prob
         changed: Problem = dataclasses.replace(problem, law=law, controller=controller)
     else:
         changed = dataclasses.replace(problem, law=law)
-    return dataclasses.replace(changed, numbers=changed.parts.pack(values))
+    changed = dataclasses.replace(changed, numbers=changed.parts.pack(values))
+    check_storage(changed)
+    return changed
 
 
 def _with_tank(problem: Problem, tank: AbstractTank) -> Problem:
@@ -134,24 +142,14 @@ def _with_tank(problem: Problem, tank: AbstractTank) -> Problem:
         raise ValueRangeError("a tank of one's own is for sampled loops", needs="a scenario with `control`")
     if problem.controller.tank is None:
         raise ValueRangeError("the scenario has no tank", needs="`tank: {}`, for its settings")
+    check_tank(tank)
     return dataclasses.replace(problem, controller=dataclasses.replace(problem.controller, tank=tank))
 
 
 def _with_elements(problem: Problem, elements: tuple[AbstractElement, ...]) -> Problem:
     n = problem.law.robot.n
     for e in elements:
-        got = type(e).__name__
-        if e.inputs().size:
-            raise ValueRangeError(
-                "an element of one's own has inputs", got=got, needs="attributes of its own"
-            )
-        effect = _effect(e, n)
-        elsewhere = (effect.force, effect.moment) if e.port == "motors" else (effect.motor,)
-        if not all(part.is_zero() for part in elsewhere):
-            needs = '`port` says where, "motors" or "end effector": its books are kept there'
-            raise ValueRangeError(f"an element touches more than the {e.port}", got=got, needs=needs)
-        if not e.stores and not effect.stored.is_zero():
-            raise ValueRangeError("an element stores energy", got=got, needs="stores = True, for its books")
+        check_element(e, n)
     plant = Plant(problem.law.robot, (*problem.elements, *elements))
     _ = plant.energies, plant.state  # which refuse two of one name
     before, numbers = problem.parts, problem.numbers
@@ -165,6 +163,8 @@ def _with_elements(problem: Problem, elements: tuple[AbstractElement, ...]) -> P
 def _with_sensors(problem: Problem, effects: tuple[AbstractSensorEffect, ...]) -> Problem:
     if not isinstance(problem, SampledProblem):
         raise ValueRangeError("sensors of one's own are for sampled loops", needs="a scenario with `control`")
+    for effect in effects:
+        check_sensor(effect, problem.law.robot.n)
     return dataclasses.replace(problem, effects=(*problem.effects, *effects))
 
 
@@ -176,14 +176,5 @@ def _with_reference(problem: Problem, events: Sequence[AbstractReferenceEvent]) 
             needs = f"from 0 to before the end, {problem.duration:g} s, when no other motion begins"
             raise ValueRangeError("a motion of the reference", got=f"at {event.at:g} s", needs=needs)
         times.add(event.at)
+        check_motion(event, problem.home)
     return dataclasses.replace(problem, events=with_motions(problem.events, events))
-
-
-def _effect(element: AbstractElement, n: int) -> Effect:
-    """Return what an element does, in symbols."""
-    x = RobotState(*(cs.SX.sym(name, n) for name in RobotState._fields))
-    velocity, spin, position = (cs.SX.sym(name, 3) for name in ("velocity", "spin", "position"))
-    _, own = element.state(n).symbols("own")
-    _, m = element.parameters(n).symbols("m")
-    at = Touch(x, velocity, spin, position, cs.SX.sym("rotation", 3, 3), own)
-    return element.act(at, SimpleNamespace(), m)

@@ -11,8 +11,6 @@ UNKNOWN = "model error and noise"
 NOTHING = "the law's own books"
 """Where everything is as the law believes."""
 
-SHAPED = "inertia shaped by the law"
-
 
 def unbooked(problem: Problem) -> str:
     """Return what the law's books miss: only what is there.
@@ -20,16 +18,16 @@ def unbooked(problem: Problem) -> str:
     The rigid law shapes the inertia of the end effector, which no storage of its own accounts for; without
     the force on it that is not even a passive wish. It measures no joint torque, so that noise is none of it.
     """
-    s, rigid = problem if isinstance(problem, SampledProblem) else None, not problem.law.shapes
+    s, own = problem if isinstance(problem, SampledProblem) else None, problem.law.unbooked
     causes = []
-    if rigid:
+    if own:
         blind = s is not None and s.controller.external.blind
-        causes.append(SHAPED + " without force sensing" * blind)
+        causes.append(own + " without force sensing" * blind)
     elif s is not None:
         causes.append("sampling")
     if not np.array_equal(problem.plant[: problem.model.size], problem.model):
         causes.append("model error")
-    if problem.noise is not None and problem.noise.variance > 0 and not rigid:
+    if problem.noise is not None and problem.noise.variance > 0 and not own:
         causes.append("noise")
     causes += [e.unknown for e in problem.elements if e.acts and e.unknown]
     return listed(causes) or NOTHING

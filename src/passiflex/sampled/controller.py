@@ -27,7 +27,7 @@ from passiflex.sampled.measurement_bound import (
 from passiflex.sampled.period import Force, Granted, Read, Settled
 from passiflex.sampled.period_state import period_after, period_start, period_state
 from passiflex.sampled.rest import Remembered, Rest
-from passiflex.sampled.signals import ControlNumbers, LedgerEntry, ObserverNumbers, PeriodResult, Setpoint
+from passiflex.sampled.signals import ControlParameters, LedgerEntry, ObserverNumbers, PeriodResult, Setpoint
 from passiflex.sampled.tank import AbstractTank, PeriodFlows, added, finite, unchanged
 
 LARGEST_READING = 1e30
@@ -54,7 +54,7 @@ class SampledController:
 
     @cached_property
     def parameters(self) -> Parts:
-        """Return the layouts of `ControlNumbers`, by the names of its parts."""
+        """Return the layouts of `ControlParameters`, by the names of its parts."""
         robot, gains = self.law.robot, self.law.layout
         layouts = {
             "model": robot.layout,
@@ -68,7 +68,7 @@ class SampledController:
             "inner": AbstractInnerLoop.layout,
             "errors": error_layout(robot.n),
         }
-        return Parts({part: layouts[part] for part in ControlNumbers._fields})
+        return Parts({part: layouts[part] for part in ControlParameters._fields})
 
     @cached_property
     def state(self) -> Layout:
@@ -90,7 +90,7 @@ class SampledController:
         elapsed: cs.SX,
         applied: cs.SX,
         state: cs.SX,
-        p: ControlNumbers,
+        p: ControlParameters,
     ) -> PeriodResult:
         """Return command, next state and ledger entry, `elapsed` seconds after the last period that ran.
 
@@ -128,7 +128,7 @@ class SampledController:
         applied: cs.SX,
         elapsed: cs.SX,
         s: Any,
-        p: ControlNumbers,
+        p: ControlParameters,
     ) -> Read:
         """Return the measurement as estimators and inner loop believe it."""
         elapsed = s.lost_time + cs.if_else(finite(elapsed, below=LARGEST_READING), elapsed, 0)
@@ -138,7 +138,7 @@ class SampledController:
         first = s.running < 1
         return Read(y, elapsed, first, observed, seen, booked_bound(y, elapsed, first, s, p.errors))
 
-    def _settle(self, r: Read, s: Any, p: ControlNumbers) -> Settled:
+    def _settle(self, r: Read, s: Any, p: ControlParameters) -> Settled:
         """Return the books after what the period before took or gave."""
         held = EndEffectorPose(s.governed_position, s.governed_rotation)
         before = self.law.stored(r.y, p.model, _chosen(s.latched, p.fallback, p.gains))
@@ -156,7 +156,7 @@ class SampledController:
         settled = self.tank.settle(s.tank_energy, flows, p.tank) if self.tank else unchanged(s.tank_energy)
         return Settled(settled, work, storage, held)
 
-    def _in_force(self, r: Read, settled: Settled, s: Any, p: ControlNumbers) -> Force:
+    def _in_force(self, r: Read, settled: Settled, s: Any, p: ControlParameters) -> Force:
         """Return what is in force: the fallback from the period on in which the tank is overdrawn, T + S kept.
 
         It is overdrawn if its level shows it beyond what the sensors explain.
@@ -190,7 +190,7 @@ class SampledController:
         f: Force,
         granted: Granted,
         setpoint: Setpoint,
-        p: ControlNumbers,
+        p: ControlParameters,
     ) -> tuple[Command, cs.SX]:
         """Return the law's command with what the valve lets through, and the valve."""
         level = granted.entry.level
@@ -210,9 +210,9 @@ class SampledController:
         return command, valve
 
     def _potential(self, at: Stored, reference: EndEffectorPose, stiffness: cs.SX) -> cs.SX:
-        return self.law.task.potential(at.pose, reference, stiffness)
+        return self.law.potential(at, reference, stiffness)
 
-    def _grant(self, r: Read, f: Force, setpoint: Setpoint, p: ControlNumbers) -> Granted:
+    def _grant(self, r: Read, f: Force, setpoint: Setpoint, p: ControlParameters) -> Granted:
         """Return the reference as far as the tank surely pays for it; a law that has fallen back holds its own."""
         one, level = cs.SX(1), f.tank.level
         if self.tank is None:
@@ -247,7 +247,7 @@ class SampledController:
         setpoint: Setpoint,
         granted: Granted,
         g: Gains,
-        p: ControlNumbers,
+        p: ControlParameters,
     ) -> cs.SX:
         """Return the torque of everything that only the tank's valve lets through (n,) N m."""
         arm, rows = self.law.robot.arm, slice(0, self.law.task.size)

@@ -80,7 +80,7 @@ class ObserverNumbers(Protocol):
     bandwidth: cs.SX
 
 
-class ControlNumbers(NamedTuple):
+class ControlParameters(NamedTuple):
     """Everything that is a run-time number of the controller, in symbols.
 
     Attributes

@@ -72,7 +72,9 @@ def _motion(found: Judgement) -> str:
     mode = found.spectrum
     if found.missed:
         return f"joint {mode.joint} is left alone for too long"
-    doubles = math.log(2) / -mode.decay if mode.decay < 0 else math.inf
+    if mode.decay >= 0:
+        return f"joint {mode.joint} never comes to rest"
+    doubles = math.log(2) / -mode.decay
     trembling = mode.frequency > SLOW and doubles * mode.frequency > 0.1
     moves = f"trembles at {mode.frequency:.0f} Hz" if trembling else "runs away"
     return f"joint {mode.joint} {moves}, twice as far every {_time(doubles)}"

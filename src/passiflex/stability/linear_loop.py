@@ -24,6 +24,10 @@ NODES, WEIGHTS = (np.polynomial.legendre.leggauss(4)[0] + 1) / 2, np.polynomial.
 """Of a quadrature over 0 to 1."""
 
 
+FORGOTTEN = 1e4
+"""[1/s] How fast a state fades out that moves nothing."""
+
+
 class DrivenLoop(NamedTuple):
     """z⁺ = A z + G w, τ = C z + D w: the loop with the noise w of the torque sensors, and its command τ.
 
@@ -219,7 +223,7 @@ class LinearLoop:
         values = self.compiled.plant.map(rows[:, : self.x.size], u, numbers)[0]
         split = values.reshape(len(others), 2, len(steps[0]), -1)
         change = (split[:, 0] - split[:, 1]) / (2 * np.array(steps))[:, :, None]
-        return np.asarray(change.transpose(0, 2, 1))
+        return _without_counters(np.asarray(change.transpose(0, 2, 1)), 4 * self.n)
 
     @cached_property
     def task_jacobian(self) -> Array:
@@ -271,3 +275,14 @@ class LinearLoop:
             found = found.copy()
             found[:, : self.x.size] += kin.heard(self.at, period, elapsed, gains)
         return found if noise else found[:, : self._told]
+
+
+def _without_counters(plants: Array, robot: int) -> Array:
+    """Return [A B] in which states of elements that move nothing, themselves included, fade out.
+
+    A counter of heat or way, the anchor of a wall that is not touched: it goes on or stays, and that is no instability.
+    """
+    counts = np.asarray(~plants[:, :, robot : plants.shape[1]].any(axis=1))
+    for i in range(counts.shape[1]):
+        plants[counts[:, i], robot + i, robot + i] = -FORGOTTEN
+    return plants
