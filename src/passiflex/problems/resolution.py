@@ -16,6 +16,7 @@ from passiflex.problems.problem import Noise, Problem, SampledProblem
 from passiflex.problems.sampling import Known, elements_of, sampled_parts
 from passiflex.problems.tank_numbers import tank_gains, tank_start
 from passiflex.problems.timeline import timeline
+from passiflex.robots.carried import carrying
 from passiflex.robots.flexible import FlexibleJointRobot
 from passiflex.scenarios.model_errors import AbstractRelative
 from passiflex.scenarios.scenario import Scenario
@@ -23,7 +24,7 @@ from passiflex.scenarios.scenario_file import parse_scenario
 
 Array = NDArray[np.float64]
 
-STANDARD_GRAVITY = (0.0, 0.0, -9.81)
+WEIGHTLESS = (0.0, 0.0, 0.0)
 SCALED = {
     "joint_stiffness": ("joint_stiffness",),
     "joint_damping": ("joint_damping",),
@@ -190,11 +191,19 @@ def _refuse_soft(robot: FlexibleJointRobot, q: Array, model: dict[str, Array], K
 def _robot_numbers(scenario: Scenario, law: AbstractLaw) -> tuple[dict[str, Array], ...]:
     """Return the robot's numbers as they are described, as they are, and as the law believes them."""
     robot = law.robot
-    described = robot.nominal(STANDARD_GRAVITY if law.gravity.in_model else (0.0, 0.0, 0.0))
+    described = robot.nominal(None if law.gravity.in_model else WEIGHTLESS)
     arm = robot.arm.chain.with_tool(scenario.tool.position, scenario.tool.rotation_vector)
     described |= {"tool_position": arm.tip_xyz, "tool_rotation": arm.tip_rotation}
+    if scenario.tool.mass:
+        described |= carrying(robot.arm.chain, described, scenario.tool.body)
     plant = _scaled(described, "deviations", scenario.deviations, robot)
-    return described, plant, _scaled(described, "model_errors", scenario.model_errors, robot)
+    model = _scaled(described, "model_errors", scenario.model_errors, robot)
+    if (payload := scenario.payload) is not None:
+        plant |= carrying(robot.arm.chain, plant, payload.body)
+        if payload.known:
+            described |= carrying(robot.arm.chain, described, payload.body)
+            model |= carrying(robot.arm.chain, model, payload.body)
+    return described, plant, model
 
 
 def _scaled(

@@ -86,9 +86,10 @@ class SerialArm:
             ArmNumbers,
         )
 
-    def nominal(self, gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)) -> dict[str, np.ndarray]:
-        """Return the numbers of the URDF for `layout`."""
+    def nominal(self, gravity: tuple[float, float, float] | None = None) -> dict[str, np.ndarray]:
+        """Return the numbers of the URDF for `layout`, with the gravity [m/s²] of its mount unless another is given."""
         bodies = self.chain.bodies
+        gravity = self.chain.gravity if gravity is None else gravity
         return {
             "link_mass": np.array([b.mass for b in bodies]),
             "link_moment": np.array([b.mass * b.com for b in bodies]),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 import warnings
 from collections.abc import Mapping
@@ -17,7 +18,8 @@ from numpy.typing import NDArray
 from passiflex.errors import NameUnknownError, PassiflexWarning, RobotError
 from passiflex.robots.chain import SerialChain, read_chain
 from passiflex.robots.doubts import doubts
-from passiflex.robots.robot_file import UNITS, RobotFile, a_urdf, unreadable
+from passiflex.robots.robot_entries import UNITS
+from passiflex.robots.robot_file import RobotFile, a_urdf, unreadable
 from passiflex.robots.urdf_xml import MOST_BYTES
 from passiflex.texts.kinds import another_file
 from passiflex.texts.quantity import shown
@@ -115,9 +117,10 @@ def _read(path: Path, *, quiet: bool = False) -> RobotDescription:
         needs = "a path, absolute or from the folder of this file"
         raise written.mistake(("urdf",), ": no such file", got=repr(str(urdf)), needs=needs)
     links = _held(urdf)
-    chain, remarks = read_chain(urdf, entries.end_effector)
+    chain, remarks, _ = read_chain(urdf, entries.end_effector, base=entries.base, frozen=written.frozen)
+    chain = dataclasses.replace(chain, mount=entries.mount.rotation(chain.mount))
     values = {entry: written.numbers(entry, chain) for entry in UNITS}
-    parts = (*chain.joints, *chain.bodies, (chain.tip_xyz, chain.tip_rotation), values.values())
+    parts = (*chain.joints, *chain.bodies, (chain.tip_xyz, chain.tip_rotation, chain.mount), values.values())
     for array in (a for part in parts for a in part if isinstance(a, np.ndarray)):
         array.setflags(write=False)
     robot = RobotDescription(
@@ -130,7 +133,7 @@ def _read(path: Path, *, quiet: bool = False) -> RobotDescription:
         torque_limit=values["torque_limit"],
         velocity_limit=values["velocity_limit"],
         position_limit=values["position_limit"],
-        sources={"links": entries.source} | {entry: getattr(entries, entry).source for entry in UNITS},
+        sources={"links": entries.source} | {entry: written.source(entry) for entry in UNITS},
     )
     if not quiet and parent_process() is None:  # whose parent has said it
         for remark in (*remarks, *doubts(robot)):

@@ -7,8 +7,8 @@ source document stay here.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import NamedTuple
 from xml.sax.saxutils import quoteattr
@@ -30,10 +30,13 @@ from passiflex.robots.bodies import (
     triangle_defect,
     turned,
 )
+from passiflex.robots.chain_choice import Choice, Tree, choose, frozen_at, moved, placed
 from passiflex.robots.urdf import read_document
 from passiflex.robots.urdf_parts import COMPONENTS, LIMITS, UNLIMITED, Edge, Joint, listed
 
 MOST_JOINTS = 100
+DOWN = (0.0, 0.0, -9.81)
+"""Gravitational acceleration in a world whose z points up [m/s²]."""
 PRINTED = 1e-3
 """Share by which moments may miss the triangle inequality, as they do when they are printed with few digits."""
 
@@ -41,6 +44,10 @@ PRINTED = 1e-3
 @dataclass(frozen=True, eq=False)
 class SerialChain:
     """A serial arm on a fixed base: one body per joint, and the end-effector frame in the last moving link.
+
+    Attributes
+    ----------
+    mount: Axes of the base, as columns, in a world whose z points up.
 
     Raises
     ------
@@ -53,6 +60,7 @@ class SerialChain:
     bodies: tuple[Body, ...]
     tip_xyz: Array
     tip_rotation: Array
+    mount: Array = field(default_factory=lambda: np.eye(3))
 
     def __post_init__(self) -> None:
         if not self.joints or len(self.joints) != len(self.bodies):
@@ -62,18 +70,33 @@ class SerialChain:
             check_body(f"the link moved by joint {joint.name!r}", body, whole=True)
 
     @property
+    def gravity(self) -> tuple[float, float, float]:
+        """Return the gravitational acceleration in the axes of the base [m/s²]."""
+        x, y, z = (np.array(DOWN) @ self.mount).tolist()
+        return x, y, z
+
+    @property
     def n(self) -> int:
         """Return the number of joints."""
         return len(self.joints)
 
     @classmethod
-    def from_urdf(cls, text_or_path: str | Path, end_effector: str | None = None) -> SerialChain:
+    def from_urdf(
+        cls,
+        text_or_path: str | Path,
+        end_effector: str | None = None,
+        *,
+        base: str | None = None,
+        frozen: Mapping[str, float] | None = None,
+    ) -> SerialChain:
         """Return the chain of a URDF document.
 
         Parameters
         ----------
         text_or_path: The document itself (any string with a `<`), or the path of its file.
-        end_effector: A link that is fixed to the last moving link; None takes the last link of the chain.
+        end_effector: The link that is held; None takes the last one of the longest chain.
+        base: The link from which on joints move; None takes the root.
+        frozen: Where other joints stand [rad, m]; 0 unless told, or amid a range without 0.
 
         Raises
         ------
@@ -87,7 +110,7 @@ class SerialChain:
         PassiflexWarning
             Of what the document can hardly mean: degrees, moments that no body has; and of what is not read of it.
         """
-        chain, remarks = read_chain(text_or_path, end_effector)
+        chain, remarks, _ = read_chain(text_or_path, end_effector, base=base, frozen=frozen)
         for remark in remarks:
             warnings.warn(remark, PassiflexWarning, stacklevel=2)
         return chain
@@ -107,6 +130,13 @@ class SerialChain:
         names = [j.name for j in self.joints] if own_names else [f"joint_{i + 1}" for i in range(self.n)]
         fixed = "tip_joint" + "_" * max(len(n) for n in names) if "tip_joint" in names else "tip_joint"
         out = [f"<robot name={quoteattr(self.name if own_names else 'arm')}>", '<link name="base"/>']
+        if not np.array_equal(self.mount, np.eye(3)):
+            out += [
+                '<link name="world"/>',
+                '<joint name="mount" type="fixed"><parent link="world"/><child link="base"/>',
+                f"  {_tag('origin', xyz=np.zeros(3), rpy=rpy_of(self.mount))}",
+                "</joint>",
+            ]
         parent = "base"
         for i, (joint, body) in enumerate(zip(self.joints, self.bodies, strict=True), start=1):
             child = f"link_{i}"
@@ -162,34 +192,53 @@ class ReadChain(NamedTuple):
 
     chain: SerialChain
     remarks: tuple[str, ...]
+    choice: Choice
 
 
-def read_chain(text_or_path: str | Path, end_effector: str | None = None) -> ReadChain:
+def read_chain(
+    text_or_path: str | Path,
+    end_effector: str | None = None,
+    *,
+    base: str | None = None,
+    frozen: Mapping[str, float] | None = None,
+) -> ReadChain:
     """Return the chain of a URDF document as `SerialChain.from_urdf` does, with its remarks in place of warnings."""
-    document = read_document(text_or_path)
-    base, children, inertials = document.base, document.children, document.inertials
-    last, (poses, leaving) = base, _rigid_part(base, children)
-    joints, bodies, remarks = [], [], list(document.remarks)
-    while leaving:
-        if len(leaving) > 1:
-            raise RobotError(
-                "the robot is not serial: moving joints branch",
-                got=listed(repr(e.joint.name) for e in leaving),
-                needs="one moving joint after another",
-                try_="making the joints of all branches but one fixed (the fingers of a gripper)",
-            )
-        last = leaving[0].child
-        joints.append(_seen_from(poses[leaving[0].parent], leaving[0].joint))
-        if len(joints) > MOST_JOINTS:
-            raise RobotError("the robot has too many moving joints", needs=f"at most {MOST_JOINTS}")
-        poses, leaving = _rigid_part(last, children)
-        bodies.append(_lump(last, poses, inertials))
-        remarks += _hardly(poses, inertials)
-    if not joints:
-        raise RobotError("the robot has no moving joint", needs="revolute, continuous or prismatic ones")
-    tip = poses[_end_effector(end_effector, last, poses, children)]
-    chain = SerialChain(document.name, tuple(joints), tuple(bodies), tip.xyz, tip.rotation)
-    return ReadChain(chain, tuple(remarks))
+    document, values = read_document(text_or_path), dict(frozen or {})
+    choice = choose(document, base, end_effector)
+    moving = choice.moving
+    if len(moving) > MOST_JOINTS:
+        raise RobotError("the robot has too many moving joints", needs=f"at most {MOST_JOINTS}")
+    document.moving(moving)
+    own, still = (
+        {e.joint.name for e in moving},
+        [e for leaving in document.children.values() for e in leaving],
+    )
+    held = {e.joint.name: frozen_at(e, values) for e in still if not e.fixed and e.joint.name not in own}
+    for name in values:
+        if name not in held:
+            raise NameUnknownError("joint that is not the arm's", name, held)
+    poses = _rigid_part(choice.base, document.children, held)
+    joints, bodies, hanging = [], [], []
+    hardly: list[str] = []
+    for edge in moving:
+        joints.append(_seen_from(poses[edge.parent], edge.joint))
+        poses = _rigid_part(edge.child, document.children, held)
+        inertials = {link: body for link in poses if (body := document.inertial(link)) is not None}
+        bodies.append(_lump(edge.child, poses, inertials))
+        hanging += [e for link in poses for e in document.children[link] if e.joint.name in held]
+        hardly += _hardly(poses, inertials)
+    remarks = [*choice.remarks, *document.remarks, *hardly]
+    if unsaid := [e for e in hanging if e.joint.name not in values]:
+        remarks.append(f"held still: {listed(_standing(e, held) for e in unsaid)}")
+    mount = placed(Tree(document).path(choice.base), held).rotation
+    tip = poses[choice.tip]
+    chain = SerialChain(document.name, tuple(joints), tuple(bodies), tip.xyz, tip.rotation, mount)
+    return ReadChain(chain, tuple(remarks), choice)
+
+
+def _standing(edge: Edge, held: Mapping[str, float]) -> str:
+    unit = "m" if edge.joint.kind == "prismatic" else "rad"
+    return f"joint {edge.joint.name!r} at {held[edge.joint.name]:.3g} {unit}"
 
 
 def _hardly(links: Iterable[str], inertials: dict[str, Body]) -> Iterator[str]:
@@ -200,19 +249,19 @@ def _hardly(links: Iterable[str], inertials: dict[str, Body]) -> Iterator[str]:
             yield f"{what}: {moments}; a digit or a decimal point may be missing in its <inertia>"
 
 
-def _rigid_part(link: str, children: dict[str, list[Edge]]) -> tuple[dict[str, Placement], list[Edge]]:
-    """Return the poses of all links fixed to `link`, in its frame, and the moving joints that leave them."""
-    poses, leaving = {link: HERE}, []
+def _rigid_part(
+    link: str, children: dict[str, list[Edge]], held: Mapping[str, float]
+) -> dict[str, Placement]:
+    """Return the poses of all links that are fixed to `link` or held still, in its frame."""
+    poses = {link: HERE}
     queue = [link]
     for parent in queue:
         for edge in children[parent]:
-            if edge.fixed:
-                (xyz, R), joint = poses[parent], edge.joint
-                poses[edge.child] = Placement(xyz + R @ joint.xyz, R @ rotation_of(joint.rpy))
+            if edge.fixed or edge.joint.name in held:
+                (xyz, R), step = poses[parent], moved(edge.joint, held.get(edge.joint.name, 0.0))
+                poses[edge.child] = Placement(xyz + R @ step.xyz, R @ step.rotation)
                 queue.append(edge.child)
-            else:
-                leaving.append(edge)
-    return poses, leaving
+    return poses
 
 
 def _seen_from(parent: Placement, joint: Joint) -> Joint:
@@ -236,26 +285,6 @@ def _lump(link: str, poses: dict[str, Placement], inertials: dict[str, Body]) ->
     whole = lumped(parts)
     check_body(f"link {link!r}", whole, whole=True)
     return whole
-
-
-def _end_effector(
-    name: str | None, last: str, poses: dict[str, Placement], children: dict[str, list[Edge]]
-) -> str:
-    """Return the link that carries the end-effector frame."""
-    if name is None:
-        while children[last]:
-            if len(children[last]) > 1:
-                got = ", ".join(repr(link) for link in poses if not children[link])
-                needs = "the name of the end effector"
-                raise RobotError("several links end the chain", got=got, needs=needs)
-            last = children[last][0].child
-        return last
-    if name not in children:
-        raise NameUnknownError("end effector", name, children)
-    if name not in poses:
-        needs = f"a link that moves with the last joint: {', '.join(poses)}"
-        raise RobotError("moving joints follow the end effector", got=repr(name), needs=needs)
-    return name
 
 
 def _tag(tag: str, **values: ArrayLike) -> str:

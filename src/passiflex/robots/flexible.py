@@ -113,8 +113,8 @@ class FlexibleJointRobot:
         )
         return Layout(self.arm.layout.fields + joints, RobotNumbers)
 
-    def nominal(self, gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)) -> dict[str, np.ndarray]:
-        """Return the robot's own numbers for `layout`."""
+    def nominal(self, gravity: tuple[float, float, float] | None = None) -> dict[str, np.ndarray]:
+        """Return the robot's own numbers for `layout`, with the gravity [m/s²] of its mount unless another is given."""
         return self.arm.nominal(gravity) | {
             "joint_stiffness": np.array(self.joint_stiffness),
             "joint_damping": np.array(self.joint_damping),

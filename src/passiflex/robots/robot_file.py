@@ -2,109 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, StringConstraints, ValidationError, ValidationInfo, field_validator
+from pydantic import (
+    ValidationError,
+)
 
 from passiflex.errors import RobotError
 from passiflex.robots.chain import SerialChain
+from passiflex.robots.robot_entries import OF_URDF, UNITS, Entries
 from passiflex.texts.kinds import another_file, of_another_kind
 from passiflex.texts.model_mistakes import explained
 from passiflex.texts.quantity import Quantity, shown, unit_factor
-from passiflex.texts.section import Mistakes, Section
 from passiflex.texts.text_file import IN_YAML, UnreadableError, decoded
 from passiflex.texts.unit_spelling import spelt_out
 from passiflex.texts.yaml_tree import XML, Place, RefusedText, Tree, dotted
 
 Array = NDArray[np.float64]
-Text = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1)]
-
-DEGREE = np.pi / 180.0
-
-UNITS: dict[str, dict[str, dict[str, float]]] = {
-    "joint_stiffness": {
-        "revolute": {"N m/rad": 1.0, "kN m/rad": 1e3, "N m/deg": 1 / DEGREE},
-        "prismatic": {"N/m": 1.0, "kN/m": 1e3, "N/mm": 1e3},
-    },
-    "joint_damping": {
-        "revolute": {"N m s/rad": 1.0, "N m s/deg": 1 / DEGREE},
-        "prismatic": {"N s/m": 1.0, "N s/mm": 1e3},
-    },
-    "motor_inertia": {
-        "revolute": {"kg m^2": 1.0, "kg cm^2": 1e-4},
-        "prismatic": {"kg": 1.0},
-    },
-    "torque_limit": {
-        "revolute": {"N m": 1.0},
-        "prismatic": {"N": 1.0, "kN": 1e3},
-    },
-    "velocity_limit": {
-        "revolute": {"rad/s": 1.0, "deg/s": DEGREE},
-        "prismatic": {"m/s": 1.0, "mm/s": 1e-3},
-    },
-    "position_limit": {
-        "revolute": {"rad": 1.0, "deg": DEGREE},
-        "prismatic": {"m": 1.0, "mm": 1e-3},
-    },
-}
-"""Entry → kind of joint → usual units, the first one SI → factor to SI. Others go by the parser of units."""
-
-
-class Entry(Section):
-    """Numbers with their unit and their source; one number or unit serves all joints."""
-
-    value: Any = Field(description="one number, or one for each joint")
-    unit: Text | tuple[Text, ...] | None = Field(
-        default=None, description="unit of all, or one for each joint"
-    )
-    source: Text = Field(description="where the numbers come from, or the word assumed")
-
-    @field_validator("unit", mode="before")
-    @classmethod
-    def _texts(cls, written: Any) -> Any:
-        if not all(isinstance(unit, str) and unit.strip() for unit in _leaves(written)):
-            raise ValueError(f"expected text, or one for each joint; got {shown(written)}")
-        return written
-
-
-class Entries(Section):
-    """A robot as it stands in its YAML file; `source` is that of the links."""
-
-    name: Text = Field(description="text")
-    description: Text = Field(description="text")
-    urdf: Text = Field(description="path of the URDF, absolute or from the folder of this file")
-    end_effector: Text = Field(description="a link that is fixed to the last moving link")
-    source: Text = Field(description="where the numbers of the links come from")
-    joint_stiffness: Entry = Field(description="K, with value, unit and source")
-    joint_damping: Entry = Field(description="D, with value, unit and source")
-    motor_inertia: Entry = Field(description="B as seen at the link, with value, unit and source")
-    torque_limit: Entry = Field(description="largest torque of the motors, with value, unit and source")
-    velocity_limit: Entry = Field(description="largest speed of the joints, with value, unit and source")
-    position_limit: Entry = Field(description="range of the joints, with value, unit and source")
-
-    @field_validator(*UNITS, mode="before")
-    @classmethod
-    def _with_a_unit(cls, written: Any, info: ValidationInfo) -> Any:
-        usual = next(iter(UNITS[info.field_name or ""]["revolute"]))
-        if not isinstance(written, dict | Entry):
-            named = any(isinstance(v, str) and not _is_number(v) for v in _leaves(written))
-            value = shown(written) if isinstance(written, list) else written
-            entry = f"{{value: {value}, {'' if named else f'unit: {usual}, '}source: ...}}"
-            needs = "a source" if named else "a unit and a source"
-            raise ValueError(f"needs {needs}; got {shown(written)}; try {entry}")
-        return written
-
-    @field_validator(*UNITS)
-    @classmethod
-    def _of_a_unit(cls, entry: Entry, info: ValidationInfo) -> Entry:
-        if entry.unit is None and any(not isinstance(v, str) or _is_number(v) for v in _leaves(entry.value)):
-            usual = next(iter(UNITS[info.field_name or ""]["revolute"]))
-            raise Mistakes((("value",), f"needs a unit; got {shown(entry.value)}; try unit: {usual}"))
-        return entry
 
 
 class RobotFile:
@@ -139,6 +56,25 @@ class RobotFile:
         if self._tree.mistakes:
             raise RobotError(f"{path} has wrong entries", got="; ".join(self._tree.lines()))
 
+    @property
+    def frozen(self) -> dict[str, float]:
+        """Return where other joints stand [rad, m]."""
+        out = {}
+        for name, written in self.entries.frozen.items():
+            try:
+                out[name] = _number(written, "rad")
+            except ValueError as error:
+                try:
+                    out[name] = _number(written, "m")
+                except ValueError:
+                    raise self.mistake(("frozen", name), f": {error}") from None
+        return out
+
+    def source(self, entry: str) -> str:
+        """Return where the numbers of an entry come from."""
+        found = getattr(self.entries, entry)
+        return "the URDF" if found is None else found.source
+
     def numbers(self, entry: str, chain: SerialChain) -> Array:
         """Return the numbers of one entry in SI units, one for each joint; position limits as pairs.
 
@@ -147,6 +83,8 @@ class RobotFile:
         RobotError
             If a unit does not fit its joint, or there are too many or impossible numbers.
         """
+        if getattr(self.entries, entry) is None:
+            return _of_urdf(entry, chain)
         units = self._units(entry, chain)
         written, n, pairs = getattr(self.entries, entry).value, chain.n, entry == "position_limit"
         shape = _shape(written)
@@ -207,6 +145,20 @@ class RobotFile:
         return RobotError(f"{where}: entry {dotted(place)}{what}", **more)
 
 
+def _number(written: Any, unit: str) -> float:
+    value = Quantity(unit).convert(written)
+    assert isinstance(value, float)  # as the shape says
+    return value
+
+
+def _of_urdf(entry: str, chain: SerialChain) -> Array:
+    """Return the limits of the URDF; a torque or speed of 0 stands for none there."""
+    if entry == "position_limit":
+        return np.array([[j.lower, j.upper] for j in chain.joints])
+    found = np.array([getattr(j, OF_URDF[entry]) for j in chain.joints])
+    return np.where(found > 0, found, np.inf)
+
+
 def unreadable(path: Path, error: Exception) -> RobotError:
     """Return what to say of a robot file that cannot be read."""
     if (other := another_file(path, "robot file")) is not None:
@@ -229,18 +181,3 @@ def _shape(written: Any) -> tuple[int, ...]:
         return ()
     rows = {_shape(row) for row in written}
     return (len(written), *(rows.pop() if len(rows) == 1 else (0,) * bool(rows)))
-
-
-def _leaves(written: Any) -> Iterator[Any]:
-    for part in written if isinstance(written, list) else ():
-        yield from _leaves(part)
-    if not isinstance(written, list):
-        yield written
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
+from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
 
 from passiflex.errors import RobotError, nearest
 from passiflex.robots.bodies import Body
@@ -15,17 +16,38 @@ from passiflex.robots.urdf_xml import read_xml
 VERSIONS = ("1", "1.0", "1.1", "1.2")
 
 
-class Document(NamedTuple):
-    """One tree: the link without a parent, the joints that leave each link, the links' inertias if any.
-
-    `remarks` are sentences on what it can hardly mean, or what is not read of it.
-    """
+@dataclass(frozen=True, eq=False)
+class Document:
+    """One tree: the link without a parent, and the joints that leave each link; of other parts what is asked for."""
 
     name: str
     base: str
     children: dict[str, list[Edge]]
-    inertials: dict[str, Body]
-    remarks: tuple[str, ...] = ()
+    links: dict[str, ET.Element]
+    joints: dict[str, ET.Element]
+    reader: PartReader
+
+    def inertial(self, link: str) -> Body | None:
+        """Return the inertia of a link, if it has any."""
+        return self.reader.inertial(self.links[link], link)
+
+    def moving(self, edges: Iterable[Edge]) -> None:
+        """Say of joints that they are to move.
+
+        Raises
+        ------
+        RobotError
+            If something of one cannot be read.
+        """
+        for edge in edges:
+            if edge.wrong is not None:
+                raise edge.wrong
+            self.reader.moving(self.joints[edge.joint.name], edge.joint)
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """Return sentences on what of all that was asked for can hardly be meant, or is not read."""
+        return tuple(self.reader.remarks())
 
 
 def read_document(source: str | Path) -> Document:
@@ -42,10 +64,9 @@ def read_document(source: str | Path) -> Document:
         raise RobotError(f"{name} has no joints", needs="links and the joints between them")
     reader = PartReader(_version(root, name))
     links = _by_name(root.findall("link"), "link")
-    edges = [reader.joint(e, name) for name, e in _by_name(root.findall("joint"), "joint").items()]
-    inertials = {name: body for name, e in links.items() if (body := reader.inertial(e, name)) is not None}
-    base, children = _tree(edges, list(links))
-    return Document(root.get("name") or "arm", base, children, inertials, tuple(reader.remarks()))
+    joints = _by_name(root.findall("joint"), "joint")
+    base, children = _tree([reader.joint(e, name) for name, e in joints.items()], list(links))
+    return Document(root.get("name") or "arm", base, children, links, joints, reader)
 
 
 def _version(root: ET.Element, name: str) -> str:

@@ -29,6 +29,11 @@ LONGEST = 1000  # characters of one attribute with numbers
 
 WITHOUT_QUATERNIONS = ("1", "1.0")
 COMPONENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+KINDS = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
+FREE = ("floating", "planar")
+"""Kinds that only something outside of the robot moves."""
+MOVES = ("origin", "axis", "limit", "mimic")
+"""What is read of a joint that moves."""
 LIMITS = {"lower": -np.inf, "upper": np.inf, "velocity": np.inf, "effort": np.inf}
 FIRST = np.array([1.0, 0.0, 0.0])
 FIRST.setflags(write=False)
@@ -53,12 +58,19 @@ class Joint(NamedTuple):
 
 
 class Edge(NamedTuple):
-    """One joint of the document, moving or fixed, with the links it connects."""
+    """One joint of the document, moving or fixed, with the links it connects.
+
+    `passive` says why it cannot be moved by a motor of its own, `mimics` the joint that it follows, `wrong` what of it
+    cannot be read, which matters only if it is to move.
+    """
 
     joint: Joint
     parent: str
     child: str
     fixed: bool
+    passive: str = ""
+    mimics: str = ""
+    wrong: RobotError | None = None
 
 
 def attribute(element: ET.Element | None, attribute: str, where: str, tag: str) -> str:
@@ -111,33 +123,43 @@ class PartReader:
         """Return one joint of the document."""
         where = f"joint {name!r}"
         kind = attribute(element, "type", where, "joint")
-        if kind not in ("revolute", "continuous", "prismatic", "fixed"):
-            needs = "revolute, continuous, prismatic or fixed"
-            raise RobotError(f"{where} is of a kind that cannot be used", got=repr(kind), needs=needs)
+        if kind not in KINDS:
+            raise RobotError(
+                f"{where} is of a kind that URDF does not know", got=repr(kind), needs=listed(KINDS)
+            )
         fixed = kind == "fixed"
-        used = ("origin",) if fixed else ("origin", "axis", "limit", "mimic")
-        refuse_unread(element, where, [tag for tag in used if element.find(tag) is None])
-        if element.find("mimic") is not None and not fixed:
-            try_ = 'making it fixed: type="fixed", as for the fingers of a gripper'
-            raise RobotError(f"{where} mimics another joint", needs="independent joints", try_=try_)
+        refuse_unread(element, where, [] if element.find("origin") is not None else ["origin"])
         parent, child = (
             attribute(self._first(element, tag, where), "link", where, tag) for tag in ("parent", "child")
         )
         xyz, rpy = self._origin(element, where)
         moves: Literal["revolute", "prismatic"] = "prismatic" if kind == "prismatic" else "revolute"
-        if fixed:
-            return Edge(Joint(name, moves, xyz, rpy, FIRST, **LIMITS), parent, child, fixed)
+        if fixed or kind in FREE:
+            passive = "" if fixed else f"is {kind}: nothing drives it"
+            return Edge(Joint(name, moves, xyz, rpy, FIRST, **LIMITS), parent, child, fixed, passive)
+        leader = element.find("mimic")
+        mimics = "" if leader is None else attribute(leader, "joint", where, "mimic")
+        passive = f"mimics joint {mimics!r}" if mimics else ""
+        axis, limits, wrong = FIRST, dict(LIMITS), None
+        try:
+            refuse_unread(element, where, [tag for tag in MOVES if element.find(tag) is None])
+            axis = self._axis(element, where)
+            limits = self._limits(element, where, continuous=kind == "continuous")
+        except RobotError as error:
+            wrong = error
+        return Edge(
+            Joint(name, moves, xyz, rpy, axis, **limits), parent, child, fixed, passive, mimics, wrong
+        )
+
+    def moving(self, element: ET.Element, joint: Joint) -> None:
+        """Note what strikes one at a joint that moves."""
+        where = f"joint {joint.name!r}"
         dynamics = element.find("dynamics")
         if dynamics is not None and any(not _zero(value) for value in dynamics.attrib.values()):
             self.damped.append(where)
-        axis, limits = (
-            self._axis(element, where),
-            self._limits(element, where, continuous=kind == "continuous"),
-        )
-        farthest = max(abs(limits["lower"]), abs(limits["upper"]))
-        if kind == "revolute" and MOST_TURNS < farthest < np.inf:
+        farthest = max(abs(joint.lower), abs(joint.upper))
+        if element.get("type") == "revolute" and MOST_TURNS < farthest < np.inf:
             self.turned_far.append(where)
-        return Edge(Joint(name, moves, xyz, rpy, axis, **limits), parent, child, fixed)
 
     def inertial(self, element: ET.Element, name: str) -> Body | None:
         """Return the inertia of one link of the document in link axes, None where it has none."""

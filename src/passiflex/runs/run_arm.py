@@ -99,7 +99,7 @@ def _candidates(run: Run) -> Iterator[SerialChain]:
 @lru_cache(maxsize=8)
 def _described(text: str) -> SerialChain:
     """Return the arm of a description, which is asked for again and again."""
-    return read_chain(text).chain
+    return read_chain(text, base="base").chain
 
 
 @lru_cache(maxsize=8)

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Self
 import yaml
 from pydantic import AliasChoices, Field, ValidationInfo, field_validator, model_validator
 
+from passiflex.scenarios.carried import Payload, Tool
 from passiflex.scenarios.control_settings import (
     Actions,
     Control,
@@ -21,7 +22,7 @@ from passiflex.scenarios.environment import Touching, as_drags
 from passiflex.scenarios.law_settings import LawSettings
 from passiflex.scenarios.model_errors import Deviations, ModelErrors
 from passiflex.scenarios.noise_settings import Noise
-from passiflex.scenarios.reference import ZERO, Length, ReferenceEvent, Turn
+from passiflex.scenarios.reference import ZERO, ReferenceEvent
 from passiflex.scenarios.row_interval import fitting_interval, interval_mistake
 from passiflex.scenarios.spans import Seconds, TimeSpan
 from passiflex.scenarios.tank_settings import TankSettings
@@ -29,15 +30,6 @@ from passiflex.texts.quantity import Quantity
 from passiflex.texts.section import Mistakes, Section
 
 Vector = tuple[float, ...]
-
-
-class Tool(Section):
-    """Where the end effector is, seen from the robot's own."""
-
-    position: Length = Field(
-        default=ZERO, description="offset of the end effector, in the axes of the robot's own, m"
-    )
-    rotation_vector: Turn = Field(default=ZERO, description="turn of the end effector's axes, rad")
 
 
 class Force(TimeSpan):
@@ -75,6 +67,7 @@ class Scenario(Section):
     description: str = Field(default="", description="what it shows")
     robot: str = Field(min_length=1, description="name in the catalogue, or path of a robot file (.yaml)")
     tool: Tool = Field(default=Tool(), description="end effector, seen from the robot's own")
+    payload: Payload | None = Field(default=None, description="what the arm has picked up")
     posture: Annotated[Vector, Quantity("rad", ((None,),))] = Field(
         description="joint angles at the start, at rest, rad"
     )
