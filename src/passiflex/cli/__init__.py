@@ -39,9 +39,15 @@ def application() -> App:
         console=console,
         suppress_keyboard_interrupt=False,  # main says what an interruption means
     )
+    above: dict[str, App] = {}
     for wanted, group in GROUPS.items():
         for command in group:
-            app.command(command.place, name=command.name, group=wanted)
+            *first, last = command.name.split()
+            for word in first:
+                if word not in above:
+                    above[word] = cyclopts.App(name=word, group=wanted)
+                    app.command(above[word])
+            (above[first[0]] if first else app).command(command.place, name=last, group=wanted)
     app.register_install_completion_command(name=COMPLETION)
     return app
 

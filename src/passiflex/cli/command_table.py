@@ -20,9 +20,9 @@ class Command(NamedTuple):
     line: str
 
 
-_MANY, _ONE, _LIMITS, _SEEN = (
+_MANY, _ONE, _LIMITS, _ROBOT, _SEEN = (
     f"passiflex.cli.{module}:"
-    for module in ("campaign_commands", "commands", "limit_commands", "view_commands")
+    for module in ("campaign_commands", "commands", "limit_commands", "robot_commands", "view_commands")
 )
 
 GROUPS = {
@@ -32,6 +32,10 @@ GROUPS = {
         Command(
             "robots", _ONE + "robots", "list the robots that are here, and where their numbers come from"
         ),
+    ),
+    "your arm": (
+        Command("robot new", _ROBOT + "new", "write a robot file for a URDF"),
+        Command("robot check", _ROBOT + "check", "look a robot over"),
     ),
     "judge": (
         Command("audit", _ONE + "audit", "say whether a run was passive"),

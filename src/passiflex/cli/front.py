@@ -25,7 +25,7 @@ def answer(arguments: Sequence[str]) -> str | None:
         return listed()
     if list(arguments) == ["--version"]:
         return __version__
-    first, commands = arguments[0], [command.name for group in GROUPS.values() for command in group]
+    first, commands = arguments[0], [c.name.split()[0] for group in GROUPS.values() for c in group]
     kind, known = ("option", OPTIONS) if first.startswith("-") else ("command", commands)
     if first not in known:
         raise NameUnknownError(kind, first, known)

@@ -47,6 +47,7 @@ class RobotDescription:
     velocity_limit: Array
     position_limit: Array
     sources: Mapping[str, str]
+    ranges: Mapping[str, tuple[float, float]]
 
 
 class _Known(NamedTuple):
@@ -117,7 +118,7 @@ def _read(path: Path, *, quiet: bool = False) -> RobotDescription:
         needs = "a path, absolute or from the folder of this file"
         raise written.mistake(("urdf",), ": no such file", got=repr(str(urdf)), needs=needs)
     links = _held(urdf)
-    chain, remarks, _ = read_chain(urdf, entries.end_effector, base=entries.base, frozen=written.frozen)
+    chain, remarks, *_ = read_chain(urdf, entries.end_effector, base=entries.base, frozen=written.frozen)
     chain = dataclasses.replace(chain, mount=entries.mount.rotation(chain.mount))
     values = {entry: written.numbers(entry, chain) for entry in UNITS}
     parts = (*chain.joints, *chain.bodies, (chain.tip_xyz, chain.tip_rotation, chain.mount), values.values())
@@ -133,6 +134,7 @@ def _read(path: Path, *, quiet: bool = False) -> RobotDescription:
         torque_limit=values["torque_limit"],
         velocity_limit=values["velocity_limit"],
         position_limit=values["position_limit"],
+        ranges=written.ranges,
         sources={"links": entries.source} | {entry: written.source(entry) for entry in UNITS},
     )
     if not quiet and parent_process() is None:  # whose parent has said it

@@ -110,7 +110,7 @@ class SerialChain:
         PassiflexWarning
             Of what the document can hardly mean: degrees, moments that no body has; and of what is not read of it.
         """
-        chain, remarks, _ = read_chain(text_or_path, end_effector, base=base, frozen=frozen)
+        chain, remarks, *_ = read_chain(text_or_path, end_effector, base=base, frozen=frozen)
         for remark in remarks:
             warnings.warn(remark, PassiflexWarning, stacklevel=2)
         return chain
@@ -188,11 +188,15 @@ class SerialChain:
 
 
 class ReadChain(NamedTuple):
-    """A chain, and a sentence on each thing of its document that it can hardly mean or that is not read."""
+    """A chain, and a sentence on each thing of its document that it can hardly mean or that is not read.
+
+    `held` says where the joints stand that hang on the arm and are not of it.
+    """
 
     chain: SerialChain
     remarks: tuple[str, ...]
     choice: Choice
+    held: Mapping[str, float]
 
 
 def read_chain(
@@ -233,7 +237,7 @@ def read_chain(
     mount = placed(Tree(document).path(choice.base), held).rotation
     tip = poses[choice.tip]
     chain = SerialChain(document.name, tuple(joints), tuple(bodies), tip.xyz, tip.rotation, mount)
-    return ReadChain(chain, tuple(remarks), choice)
+    return ReadChain(chain, tuple(remarks), choice, {e.joint.name: held[e.joint.name] for e in hanging})
 
 
 def _standing(edge: Edge, held: Mapping[str, float]) -> str:

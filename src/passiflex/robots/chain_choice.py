@@ -17,7 +17,7 @@ LEAST_TRUNK = 4
 """Joints that chains of equal length must have in common, and half of theirs, to be one arm with fingers."""
 LEAST_ARM = 3
 """Joints that are left of an arm whose last ones are taken for a gripper's."""
-GRIPS = re.compile("finger|grip|jaw|claw|knuckle|thumb", re.IGNORECASE)
+GRIPS = re.compile("finger|grip|jaw|claw|knuckle|thumb|(^|_)(index|middle|ring|little|pinky)", re.IGNORECASE)
 """How the joints of a gripper are called."""
 TIPS = (
     r"tcp|tool_?center",
@@ -90,8 +90,7 @@ class Tree:
         moving = [e for e in path if not e.fixed]
         while len(moving) > LEAST_ARM:
             last = moving[-1]
-            called = any(GRIPS.search(name) for name in (last.joint.name, last.child))
-            if not (called or last.joint.name in self.led):
+            if not (GRIPS.search(last.joint.name) or last.joint.name in self.led):
                 break
             moving.pop()
             path = path[: path.index(last)]

@@ -60,6 +60,7 @@ class FlexibleJointRobot:
     joint_stiffness, joint_damping, motor_inertia: K [N m/rad], D [N m s/rad], B [kg m²], (n,).
     torque_limit, velocity_limit, position_limit: [N m], [rad/s], [rad]; (n,), (n,), (n, 2).
     sources: Where each number comes from, or the word *assumed*.
+    ranges: Shares of an entry's numbers between which the true ones may be, where that was said.
     """
 
     name: str
@@ -71,6 +72,7 @@ class FlexibleJointRobot:
     velocity_limit: NDArray[np.float64]
     position_limit: NDArray[np.float64]
     sources: Mapping[str, str] = field(default_factory=dict)
+    ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for name in ("joint_stiffness", "joint_damping", "motor_inertia"):
@@ -154,4 +156,5 @@ def _built(d: RobotDescription) -> FlexibleJointRobot:
         velocity_limit=d.velocity_limit,
         position_limit=d.position_limit,
         sources=d.sources,
+        ranges=d.ranges,
     )

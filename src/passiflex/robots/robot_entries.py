@@ -99,6 +99,9 @@ class Entry(Section):
         default=None, description="unit of all, or one for each joint"
     )
     source: Text = Field(description="where the numbers come from, or the word assumed")
+    range: tuple[float, float] | None = Field(
+        default=None, description="shares of the value between which the true one may be, as [0.5, 2]"
+    )
 
     @field_validator("unit", mode="before")
     @classmethod

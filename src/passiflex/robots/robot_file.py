@@ -70,6 +70,21 @@ class RobotFile:
                     raise self.mistake(("frozen", name), f": {error}") from None
         return out
 
+    @property
+    def ranges(self) -> dict[str, tuple[float, float]]:
+        """Return the shares of an entry's numbers between which the true ones may be."""
+        found = {}
+        for entry in UNITS:
+            written = getattr(self.entries, entry)
+            if written is None or written.range is None:
+                continue
+            low, high = written.range
+            if not 0 < low <= 1 <= high < np.inf:
+                needs = "shares of the value, the first up to 1, the second from 1 on"
+                raise self.mistake((entry, "range"), " is impossible", got=list(written.range), needs=needs)
+            found[entry] = (low, high)
+        return found
+
     def source(self, entry: str) -> str:
         """Return where the numbers of an entry come from."""
         found = getattr(self.entries, entry)

@@ -1,0 +1,109 @@
+"""The commands on one robot: robot new, robot check."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import cyclopts
+
+from passiflex.cli.terminal import console
+
+if TYPE_CHECKING:
+    from passiflex.robots.flexible import FlexibleJointRobot
+    from passiflex.robots.once_over import OnceOver
+
+
+def new(
+    urdf: Path,
+    /,
+    *,
+    base: Annotated[str | None, cyclopts.Parameter(help="link from which on joints are the arm's")] = None,
+    end_effector: Annotated[str | None, cyclopts.Parameter(help="link that is held")] = None,
+    drive: Annotated[
+        str | None, cyclopts.Parameter(help="class of the drives: sensed, industrial, servo, direct")
+    ] = None,
+    out: Annotated[
+        Path | None, cyclopts.Parameter(help="file to write; the URDF's name with .yaml if left out")
+    ] = None,
+) -> int:
+    """Write a robot file for a URDF: its arm, limits and masses, and estimates of K, D and B with a range and a reason.
+
+    The longest chain without names; a xacro is expanded where the package xacrodoc is there.
+    """
+    from passiflex.files import OutputError, require_writable, whole_file
+    from passiflex.robots.catalogue import read_description
+    from passiflex.robots.doubts import doubts
+    from passiflex.robots.flexible import FlexibleJointRobot
+    from passiflex.robots.new_file import new_robot_file
+    from passiflex.robots.xacro import expanded
+
+    target = out or urdf.with_name(urdf.name.split(".")[0] + ".yaml")
+    if target.exists():
+        raise OutputError("the file to write is there already", got=str(target), try_="--out OTHER.yaml")
+    require_writable(target.parent)
+    plain = expanded(urdf, target.parent)
+    made = new_robot_file(
+        plain, base=base, end_effector=end_effector, drive=drive, folder=target.parent.resolve()
+    )
+    with whole_file(target) as temporary:
+        temporary.write_text(made.text, encoding="utf-8")
+    for remark in made.read.remarks:
+        console.print(remark)
+    console.print(f"wrote {target}")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # what is said of the URDF stands above
+        robot = FlexibleJointRobot.load(target)
+    for doubt in doubts(read_description(target)):
+        console.print(f"looks wrong: {doubt}")
+    _print(robot)
+    console.print(
+        f"assumed, for {made.drive} drives: joint_stiffness, joint_damping, motor_inertia; which of them the answer "
+        f"hangs on: passiflex card {target} --rate '1 kHz'"
+    )
+    return 0
+
+
+def check(robot: str, /) -> int:
+    """Look a robot over: reach, masses, weight against torque limits, lowest elastic frequency, what looks wrong."""
+    from passiflex.robots.flexible import FlexibleJointRobot
+
+    _print(FlexibleJointRobot.load(robot))
+    return 0
+
+
+def _print(robot: FlexibleJointRobot) -> None:
+    from passiflex.robots.once_over import oddities, once_over
+
+    seen = once_over(robot)
+    console.print(_table(robot, seen))
+    name = robot.arm.chain.joints[seen.swings].name
+    console.print(
+        f"it reaches {seen.reach:.3g} m from its first joint; all that moves weighs {seen.mass:.3g} kg"
+    )
+    console.print(f"motors held, its links swing at {seen.swing:.3g} Hz and more, slowest at {name!r}")
+    console.print(f"motors free, the slowest resonance of a joint is at {seen.resonance:.3g} Hz")
+    assumed = [entry for entry, source in robot.sources.items() if "assumed" in source]
+    if assumed:
+        console.print(f"assumed: {', '.join(assumed)}")
+    for oddity in oddities(robot, seen):
+        console.print(f"looks wrong: {oddity}")
+
+
+def _table(robot: FlexibleJointRobot, seen: OnceOver) -> object:
+    from rich.table import Table
+
+    chain = robot.arm.chain
+    table = Table("joint", "moves", "K", "D", "B", "weight, at most", "torque limit", title=robot.name)
+    for i, (joint, body) in enumerate(zip(chain.joints, chain.bodies, strict=True)):
+        table.add_row(
+            joint.name,
+            f"{body.mass:.3g} kg",
+            f"{robot.joint_stiffness[i]:.3g}",
+            f"{robot.joint_damping[i]:.3g}",
+            f"{robot.motor_inertia[i]:.3g}",
+            f"{seen.weight[i]:.3g}",
+            f"{robot.torque_limit[i]:.4g}",
+        )
+    return table

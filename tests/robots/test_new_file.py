@@ -1,0 +1,129 @@
+"""A robot file for a URDF: it loads as it is written, and what it assumes covers what is published."""
+
+from __future__ import annotations
+
+import re
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from cli.shell import Shell
+from passiflex.errors import NameUnknownError, RobotError
+from passiflex.robots.drives import DRIVES, drive_of
+from passiflex.robots.flexible import FlexibleJointRobot
+from passiflex.robots.new_file import new_robot_file
+from passiflex.robots.once_over import oddities, once_over
+from robots.test_chain_choice import tree, two_arms
+
+PUBLISHED = {
+    "LWR IV": ([320, 320, 176, 176, 110, 40, 40], None, [3.19, 3.05, 1.98, 2.05, 0.787, 0.391, 0.394]),
+    "FR3": ([87] * 4 + [12] * 3, 7000.0, [0.605721456] * 2 + [0.462474144] * 2 + [0.205544064] * 3),
+    "Gen3": ([39] * 4 + [9] * 3, [4000] * 4 + [3500] * 3, [0.3] * 4 + [0.18, 0.18, 0.2]),
+}
+"""Torque ratings, K and B of arms with torque sensors (sources: `docs/robots.md`; K of the LWR is not public)."""
+
+
+@pytest.mark.parametrize("name", PUBLISHED)
+def test_what_is_published_lies_in_the_range_of_an_estimate(name: str) -> None:
+    rating, K, B = PUBLISHED[name]
+    found = DRIVES["sensed"].estimates(np.array(rating, dtype=float))
+    for entry, value in (("joint_stiffness", K), ("motor_inertia", B)):
+        if value is not None:
+            share = value / found[entry].value
+            assert (share >= found[entry].low).all(), (entry, share)
+            assert (share <= found[entry].high).all(), (entry, share)
+
+
+def test_the_class_of_drives_goes_by_the_strongest_joint_unless_it_is_said() -> None:
+    assert drive_of(None, np.array([3.0, 1.0]))[0] == "servo"
+    assert drive_of(None, np.array([87.0, 12.0]))[0] == "sensed"
+    assert drive_of("direct", np.array([87.0]))[1] is DRIVES["direct"]
+    with pytest.raises(NameUnknownError, match="unknown class of drives; got 'spring'; needs one of direct"):
+        drive_of("spring", np.ones(1))
+
+
+def test_a_new_file_loads_and_says_what_it_assumes(tmp_path: Path) -> None:
+    (tmp_path / "my arm.urdf").write_text(tree(4))
+    made = new_robot_file(tmp_path / "my arm.urdf")
+    (tmp_path / "arm.yaml").write_text(made.text)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")  # all that had to be decided is written down
+        warnings.filterwarnings("ignore", message=".*(joint_stiffness|motor_inertia)")
+        robot = FlexibleJointRobot.load(tmp_path / "arm.yaml")
+    assert robot.name == "my_arm"
+    assert robot.n == 4
+    for entry, estimate in made.estimates.items():
+        np.testing.assert_allclose(getattr(robot, entry), estimate.value, rtol=5e-3)
+        assert robot.ranges[entry] == pytest.approx((estimate.low, estimate.high), rel=2e-3)
+        assert robot.sources[entry].startswith("assumed: ")
+    np.testing.assert_array_equal(robot.torque_limit, [10] * 4)
+    np.testing.assert_array_equal(robot.position_limit, [[-2, 2]] * 4)
+    assert yaml.safe_load(made.text)["frozen"] == {"close": 0, "follow": 0}
+    assert robot.sources["torque_limit"] == "the URDF"
+
+
+def test_a_urdf_without_torque_limits_gets_those_that_its_weight_needs(tmp_path: Path) -> None:
+    (tmp_path / "arm.urdf").write_text(tree(4).replace('effort="10"', 'effort="0"'))
+    made = new_robot_file(tmp_path / "arm.urdf")
+    (tmp_path / "arm.yaml").write_text(made.text)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        robot = FlexibleJointRobot.load(tmp_path / "arm.yaml")
+    np.testing.assert_allclose(robot.torque_limit, np.maximum(2 * once_over(robot).weight, 1), rtol=5e-3)
+    assert "assumed" in robot.sources["torque_limit"]
+
+
+@pytest.mark.parametrize(("low", "high"), [(0, 2), (1.1, 2), (0.5, 0.9), (0.5, float("inf"))])
+def test_a_range_that_is_none_is_said(tmp_path: Path, low: float, high: float) -> None:
+    (tmp_path / "arm.urdf").write_text(tree(4))
+    text = new_robot_file(tmp_path / "arm.urdf").text
+    (tmp_path / "arm.yaml").write_text(re.sub(r"range: \[.*", f"range: [{low}, {high}]", text, count=1))
+    with pytest.raises(RobotError, match=r"joint_stiffness\.range|entry joint_stiffness"):
+        FlexibleJointRobot.load(tmp_path / "arm.yaml")
+
+
+def test_a_look_at_the_double_pendulum_is_what_its_formulas_say() -> None:
+    robot = FlexibleJointRobot.load("planar2r")
+    seen, chain = once_over(robot), robot.arm.chain
+    (a, b), c = chain.bodies, np.linalg.norm(chain.joints[1].xyz)
+    assert seen.mass == pytest.approx(a.mass + b.mass)
+    stretched = 9.81 * (a.mass * np.linalg.norm(a.com) + b.mass * (c + np.linalg.norm(b.com)))
+    assert stretched * 0.95 < seen.weight[0] <= stretched * (1 + 1e-9)
+    assert seen.weight[1] == pytest.approx(9.81 * b.mass * np.linalg.norm(b.com), rel=0.02)
+    assert seen.reach == pytest.approx(
+        c + np.linalg.norm(chain.tip_xyz), rel=1e-9
+    )  # zero is one of the postures
+    assert seen.swing < seen.resonance
+    assert list(oddities(robot, seen)) == []
+
+
+def test_the_two_commands_write_a_file_and_look_it_over(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    (tmp_path / "arm.urdf").write_text(tree(4))
+    monkeypatch.chdir(tmp_path)
+    shell = Shell(monkeypatch, capsys)
+    made = shell("robot", "new", "arm.urdf", "--drive", "direct")
+    assert made.status == 0, made.err
+    for said in (
+        "from 'world' to 'tcp': 4 joints",
+        "held still: joint 'close' at 0 m",
+        "wrote arm.yaml",
+        "swing at",
+    ):
+        assert said in made.out.replace("\n", " ")
+    again = shell("robot", "new", "arm.urdf")
+    assert again.status == 2
+    assert "is there already" in again.err
+    looked = shell("robot", "check", "arm.yaml")
+    assert looked.status == 0
+    assert "all that moves weighs" in looked.out
+    (tmp_path / "two.urdf").write_text(two_arms())
+    several = shell("robot", "new", "two.urdf")
+    assert several.status == 2
+    assert "try left_tool, right_tool" in several.err.replace("\n", " ")
+    one = shell("robot", "new", "two.urdf", "--end-effector", "right_tool")
+    assert one.status == 0, one.err
