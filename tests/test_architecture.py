@@ -29,6 +29,7 @@ ROOMS = (
     "passivity",
     "metrics",
     "limits",
+    "cards",
     "chunks",
     "campaigns",
     "diagrams",

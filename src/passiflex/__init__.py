@@ -7,8 +7,8 @@
 
 The rooms, in the order in which they may import each other: `texts`, `robots`, `phs`, `control`, `sampled`, `elements`,
 `native`; `scenarios`, `loops`, `problems`, `stability`, `runs`, `simulation`; `passivity`, `metrics`, `limits`,
-`chunks`, `campaigns`; then what looks at their results: `diagrams`, `plotting`, `reports`, `exports`; then `studies`,
-`cli`.
+`cards`, `chunks`, `campaigns`; then what looks at their results: `diagrams`, `plotting`, `reports`, `exports`; then
+`studies`, `cli`.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from passiflex.campaigns import load_campaign as load_campaign
     from passiflex.campaigns import replay as replay
     from passiflex.campaigns import run_campaign as run_campaign
+    from passiflex.cards import card as card
     from passiflex.control import ImpedanceLaw as ImpedanceLaw
     from passiflex.control import RigidImpedanceLaw as RigidImpedanceLaw
     from passiflex.limits import check as check
@@ -50,6 +51,7 @@ _ROOMS = {
     "Run": "simulation",
     "Scenario": "simulation",
     "audit": "passivity",
+    "card": "cards",
     "catalogue": "robots",
     "check": "limits",
     "limit_map": "limits",

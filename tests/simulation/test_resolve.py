@@ -149,10 +149,8 @@ def test_the_rigid_law_needs_as_many_joints_as_directions() -> None:
 
 def test_an_unknown_robot_lists_the_nearest() -> None:
     message = refused(NameUnknownError, robot_name="iiwa15")
-    assert message == (
-        "unknown robot; got 'iiwa15'; needs one of iiwa14, iiwa14_stuerz, planar2r; "
-        "try 'iiwa14' or 'iiwa14_stuerz'"
-    )
+    assert message.startswith("unknown robot; got 'iiwa15'; needs one of fr3, gen3, iiwa14, ")
+    assert message.endswith("; try 'iiwa14' or 'iiwa7' or 'iiwa14_stuerz'")
 
 
 @pytest.mark.parametrize("name", ["shaped_stiffness", "shaped_inertia"])

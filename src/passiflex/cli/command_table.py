@@ -36,6 +36,7 @@ GROUPS = {
     "your arm": (
         Command("robot new", _ROBOT + "new", "write a robot file for a URDF"),
         Command("robot check", _ROBOT + "check", "look a robot over"),
+        Command("card", _ROBOT + "card", "say on one page which gains are safe for it, and what limits them"),
     ),
     "judge": (
         Command("audit", _ONE + "audit", "say whether a run was passive"),

@@ -107,3 +107,32 @@ def _table(robot: FlexibleJointRobot, seen: OnceOver) -> object:
             f"{robot.torque_limit[i]:.4g}",
         )
     return table
+
+
+def card(
+    robot: str,
+    /,
+    *,
+    rate: Annotated[str, cyclopts.Parameter(help="control rate, as '1 kHz'")],
+    delay: Annotated[str, cyclopts.Parameter(help="of a command, as '1 ms'")] = "0 s",
+    out: Annotated[
+        Path | None,
+        cyclopts.Parameter(help="folder for ROBOT.html, .pdf and .txt; the page alone is printed without"),
+    ] = None,
+) -> int:
+    """Make the card of an arm: the largest safe gains at a rate, what limits them, and what people say, simulated."""
+    from passiflex.cards import card as card_of
+    from passiflex.cli.terminal import progress_lines, timed
+    from passiflex.files import require_writable
+    from passiflex.reports.card_page import FORMS, card_text, write_card
+
+    with timed():
+        if out is not None:
+            out.mkdir(parents=True, exist_ok=True)
+            require_writable(out)
+        with progress_lines() as report:
+            made = card_of(robot, rate, delay, report=report)
+        console.print(card_text(made), markup=False, highlight=False, soft_wrap=True)
+        for form in FORMS if out is not None else ():
+            console.print(f"wrote {write_card(made, (out or Path()) / f'{made.robot.name}{form}')}")
+    return 0

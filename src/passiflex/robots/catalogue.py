@@ -48,6 +48,7 @@ class RobotDescription:
     position_limit: Array
     sources: Mapping[str, str]
     ranges: Mapping[str, tuple[float, float]]
+    sensed: bool
 
 
 class _Known(NamedTuple):
@@ -135,6 +136,7 @@ def _read(path: Path, *, quiet: bool = False) -> RobotDescription:
         velocity_limit=values["velocity_limit"],
         position_limit=values["position_limit"],
         ranges=written.ranges,
+        sensed=entries.torque_sensors,
         sources={"links": entries.source} | {entry: written.source(entry) for entry in UNITS},
     )
     if not quiet and parent_process() is None:  # whose parent has said it

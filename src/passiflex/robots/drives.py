@@ -39,6 +39,7 @@ class Drive:
     inertia: [kg m²/(N m)], behind the gear; likewise.
     damping: ζ of the motor against a locked link; likewise.
     neighbours: What is published.
+    sensed: Whether it has torque sensors.
     """
 
     title: str
@@ -49,6 +50,7 @@ class Drive:
     damping: float
     damping_factor: float
     neighbours: str
+    sensed: bool = False
 
     def estimates(self, rating: Array) -> dict[str, Estimate]:
         """Return the numbers of joints with these torque ratings [N m], by entry of a robot file."""
@@ -75,6 +77,7 @@ DRIVES: Mapping[str, Drive] = {
         "strain wave gears with torque sensors",
         700.0, 3.0, 0.012, 2.5, 0.01, 4.0,
         "LWR IV, FR3, Gen3",
+        sensed=True,
     ),
     "industrial": Drive(
         "strain wave gears without torque sensors",

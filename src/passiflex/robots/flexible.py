@@ -61,6 +61,7 @@ class FlexibleJointRobot:
     torque_limit, velocity_limit, position_limit: [N m], [rad/s], [rad]; (n,), (n,), (n, 2).
     sources: Where each number comes from, or the word *assumed*.
     ranges: Shares of an entry's numbers between which the true ones may be, where that was said.
+    sensed: Whether it measures the torque in its joints.
     """
 
     name: str
@@ -73,6 +74,7 @@ class FlexibleJointRobot:
     position_limit: NDArray[np.float64]
     sources: Mapping[str, str] = field(default_factory=dict)
     ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    sensed: bool = True
 
     def __post_init__(self) -> None:
         for name in ("joint_stiffness", "joint_damping", "motor_inertia"):
@@ -157,4 +159,5 @@ def _built(d: RobotDescription) -> FlexibleJointRobot:
         position_limit=d.position_limit,
         sources=d.sources,
         ranges=d.ranges,
+        sensed=d.sensed,
     )

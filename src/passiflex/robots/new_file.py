@@ -62,7 +62,8 @@ def new_robot_file(
     name, kind = drive_of(drive, rating)
     estimates = kind.estimates(rating)
     where = path.name if folder is None or folder.resolve() == path.parent.resolve() else str(path.resolve())
-    lines = [*_head(path, read, where), *_joint_lines(chain), *_estimated(estimates, name, kind, chain)]
+    lines = [*_head(path, read, where), f"torque_sensors: {str(kind.sensed).lower()}"]
+    lines += [*_joint_lines(chain), *_estimated(estimates, name, kind, chain)]
     lines += _ratings(rating, told, chain)
     return NewFile("\n".join(lines) + "\n", read, name, estimates)
 

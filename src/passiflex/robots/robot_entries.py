@@ -127,6 +127,7 @@ class Entries(Section):
         default={},
         description="where other joints stand, by name, rad or m; 0 if left out, or amid a range without 0",
     )
+    torque_sensors: bool = Field(default=True, description="whether it measures the torque in its joints")
     mount: Mount = Field(default=Mount(), description="how the base is mounted; as in the URDF if left out")
     source: Text = Field(description="where the numbers of the links come from")
     joint_stiffness: Entry = Field(description="K, with value, unit and source")

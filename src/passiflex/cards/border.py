@@ -1,0 +1,198 @@
+"""How far the gains of a setting may go: the largest K_x, the window of D_x, the slowest clock, and what limits it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from passiflex.cards.setting import ROTATION, TRANSLATION, Scales, Setting
+from passiflex.stability.modes import Spectrum
+
+Array = NDArray[np.float64]
+
+STIFFEST = {"translation": 30_000.0, "rotation": 3_000.0}
+"""[N/m], [N m/rad] Nothing stiffer is looked for: the springs of the joints are softer."""
+USUAL = {
+    "translation": (1000.0, 300.0, 3000.0, 100.0, 10_000.0, 30.0),
+    "rotation": (30.0, 100.0, 10.0, 300.0, 3.0, 1.0),
+}
+"""From which on the largest one is looked for: the first that holds."""
+SCALES: tuple[Scales, ...] = (
+    (1.0, 1.0), (0.5, 1.0), (0.5, 0.5), (1.0, 0.5), (2.0, 1.0), (0.25, 1.0), (0.25, 0.5), (0.25, 0.25), (0.125, 0.5),
+    (4.0, 1.0), (2.0, 2.0), (1.0, 2.0),
+)  # fmt: skip
+"""Multiples of the designed damping that are tried, of translation and rotation, the likeliest first."""
+FEW = 4
+"""Of them, where they are tried at many clocks."""
+WIDEST = 64.0
+"""How many times the damping is raised or lowered at most."""
+FINE = 1.04
+"""Ratio to which a border is found."""
+LOWERED = 0.8
+"""By which K_x is lowered when a search of the box finds a robot that does not hold."""
+BEYOND = 1.1
+"""By which K_x is raised until something does not hold, to see what that is."""
+MOST_BEYOND = 40
+SEARCHES = 10
+SLOWEST, FASTEST = 20.0, 20_000.0
+"""[Hz] Between which the lowest rate is looked for."""
+LATEST = 40
+"""Periods of delay at most."""
+
+
+class Window(NamedTuple):
+    """Least and largest D_x of a part, and that of the other part with it [N s/m, N m s/rad]."""
+
+    least: float
+    most: float
+    beside: float
+
+
+class Border(NamedTuple):
+    """The largest K_x that holds with a margin.
+
+    Attributes
+    ----------
+    part: translation or rotation.
+    stiffness: [N/m] or [N m/rad]; 0 if nothing holds, infinite if all that was looked at does.
+    damping: What D_x may be at half of it.
+    mode: What does not die out beyond.
+    joint: Whose name.
+    posture: At which, (n,) rad.
+    """
+
+    part: str
+    stiffness: float
+    damping: Window
+    mode: Spectrum | None
+    joint: str
+    posture: Array
+
+    @property
+    def why(self) -> str:
+        """Return what limits it, in words."""
+        if self.mode is None:
+            return "nothing up to there"
+        body = "links" if self.mode.link_share > 0.5 else "motor"
+        where = f"at {self.mode.frequency:.0f} Hz" if self.mode.frequency > 0.5 else "slowly"
+        return f"the {body} of {self.joint} {where}"
+
+
+def stiffness_of(part: str, value: float) -> tuple[float, float]:
+    """Return K_x of translation and rotation, one of them as given and the other one as usual."""
+    return (value, ROTATION) if part == "translation" else (TRANSLATION, value)
+
+
+def border(setting: Setting, part: str, *, searched: bool = True) -> Border:
+    """Return the largest K_x that some damping holds with, the rest of the gains as usual, over the whole box.
+
+    Without a search it is the members that are known that decide.
+    """
+
+    def scale_for(k: float) -> Scales | None:
+        pair = stiffness_of(part, k)
+        return next((s for s in SCALES if setting.holds(setting.gains(*pair, s))), None)
+
+    begun = next((k for k in USUAL[part] if scale_for(k) is not None), 0.0)
+    most = _largest(lambda k: scale_for(k) is not None, begun, STIFFEST[part]) if begun else 0.0
+    for _ in range(SEARCHES if most and searched else 0):
+        scale = scale_for(most)
+        if scale is not None and setting.searched(setting.gains(*stiffness_of(part, most), scale)):
+            break
+        most *= LOWERED
+    if not most:
+        return Border(
+            part, 0.0, Window(math.nan, math.nan, math.nan), *_failing(setting, part, USUAL[part][0])
+        )
+    window = damping_window(setting, part, most / 2)
+    if most >= STIFFEST[part]:
+        return Border(part, math.inf, window, None, "", setting.postures[0])
+    return Border(part, most, window, *_failing(setting, part, most))
+
+
+def damping_window(setting: Setting, part: str, k: float) -> Window:
+    """Return the least and the largest D_x that holds at a K_x."""
+    pair, row = stiffness_of(part, k), 0 if part == "translation" else -1
+    inside = next((s for s in SCALES if setting.holds(setting.gains(*pair, s))), None)
+    if inside is None:
+        return Window(math.nan, math.nan, math.nan)
+    push, turn = inside
+
+    def holds(share: float) -> bool:
+        scales = (share * push, turn) if part == "translation" else (push, share * turn)
+        return setting.holds(setting.gains(*pair, scales))
+
+    low = 1 / _largest(lambda share: holds(1 / share), 1.0, WIDEST)
+    high = _largest(holds, 1.0, WIDEST)
+    found = np.diag(setting.gains(*pair, inside)["damping"])
+    return Window(low * found[row], high * found[row], float(found[-1 - row]))
+
+
+def slowest_clock(setting: Setting, k: float) -> float:
+    """Return the lowest rate [Hz] at which a translational K_x holds, with the delay in periods that it has; or inf."""
+    periods = setting.delay * setting.rate
+
+    def holds(rate: float) -> bool:
+        return any(
+            setting.holds(setting.gains(k, ROTATION, s), 1 / rate, periods / rate) for s in SCALES[:FEW]
+        )
+
+    if not holds(FASTEST):
+        return math.inf
+    return FASTEST / _largest(lambda slower: holds(FASTEST / slower), 1.0, FASTEST / SLOWEST)
+
+
+def longest_delay(setting: Setting, k: float) -> float:
+    """Return the longest delay [s] with which a translational K_x holds at the setting's rate; nan if none does."""
+    period = 1 / setting.rate
+
+    def holds(delay: float) -> bool:
+        return any(setting.holds(setting.gains(k, ROTATION, s), period, delay) for s in SCALES[:FEW])
+
+    if not holds(0.0):
+        return math.nan
+    low, high = 0.0, LATEST * period
+    while high - low > period / 20:
+        middle = (low + high) / 2
+        low, high = (middle, high) if holds(middle) else (low, middle)
+    return low
+
+
+def _failing(setting: Setting, part: str, k: float) -> tuple[Spectrum, str, Array]:
+    """Return what does not die out beyond a K_x with the damping that bears most, in which joint, and where."""
+    for _ in range(MOST_BEYOND):
+        k *= BEYOND
+        pair, found = stiffness_of(part, k), []
+        for scale in SCALES:
+            gains = setting.gains(*pair, scale)
+            worst = max(setting.members, key=lambda m: setting.radius(m, gains))
+            found.append((setting.radius(worst, gains), scale, worst))
+        radius, scale, member = min(found, key=lambda entry: entry[0])
+        if radius >= 1:
+            break
+    loop, late = setting.box.loop(member)
+    mode = loop.spectrum(1 / setting.rate, late, setting.gains(*pair, scale))
+    name = setting.robot.arm.chain.joints[mode.joint - 1].name
+    return mode, name, setting.box.angles(member)
+
+
+def _largest(holds: Callable[[float], bool], low: float, high: float) -> float:
+    """Return the largest value up to `high` that holds, from `low` on by doubling and halving; 0 if `low` does not."""
+    if not holds(low):
+        return 0.0
+    step = 4.0
+    while low < high:
+        beyond = min(low * step, high)
+        if not holds(beyond):
+            break
+        low = beyond
+    else:
+        return high
+    while beyond / low > FINE:
+        middle = math.sqrt(low * beyond)
+        low, beyond = (middle, beyond) if holds(middle) else (low, middle)
+    return low

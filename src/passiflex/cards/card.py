@@ -1,0 +1,270 @@
+"""The card of an arm: which gains are safe at its rate, and what limits them."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from passiflex.cards.border import SCALES, Border, border, longest_delay, slowest_clock
+from passiflex.cards.setting import MARGIN, ROTATION, Setting
+from passiflex.control.motion import hold, moved
+from passiflex.control.task import PoseTask, PositionTask
+from passiflex.errors import PassiflexError
+from passiflex.limits import Recommendation, recommend
+from passiflex.limits.confirmation import disturbed, growth
+from passiflex.limits.one_thread import on_one_thread
+from passiflex.limits.subject import DELAY, RATE, number
+from passiflex.limits.workspace import workspace_postures
+from passiflex.problems.altered import altered
+from passiflex.problems.problem import Event
+from passiflex.robots.flexible import FlexibleJointRobot
+from passiflex.simulation.simulate_sampled import simulate_unchecked
+
+Array = NDArray[np.float64]
+Report = Callable[[str], None]
+
+TOOLS = (0.5, 1.0, 2.0)
+"""[kg] Masses on the flange beside none."""
+STIFFNESSES = (200.0, 500.0, 1000.0, 3000.0)
+"""[N/m] For which the slowest clock and the longest delay are looked for."""
+USUAL = 1000.0
+"""[N/m]"""
+FOLKLORE = 5000.0
+"""[N/m] What people call a typical largest stiffness."""
+RAISED, MOST_RAISED = 1.15, 16.0
+"""By which B_e of all joints is raised for the tools, and most."""
+STEP, LASTS = 0.01, 1.0
+"""[m], [s] A step of the reference in the simulations."""
+NOISE = 0.2
+"""[(N m)²] Variance of the torque sensors' noise."""
+LEAST_POSE = 6
+"""Joints of an arm that a pose is asked of; with fewer it is a position."""
+
+
+class Row(NamedTuple):
+    """One way to run the arm, with its border."""
+
+    tool: float
+    shaped: bool
+    border: Border
+
+
+class Clock(NamedTuple):
+    """The lowest rate [Hz] and the longest delay [s] for a stiffness [N/m]."""
+
+    stiffness: float
+    rate: float
+    delay: float
+
+
+class Hang(NamedTuple):
+    """An entry of the robot file at both ends of its range, and by how much the lowest rate for a usual K_x changes."""
+
+    entry: str
+    shares: tuple[float, float]
+    rates: tuple[float, float]
+    assumed: bool
+
+
+class Told(NamedTuple):
+    """A piece of folklore, and what would happen.
+
+    Attributes
+    ----------
+    said: The gains.
+    frequency: Of the slowest mode to die out [Hz].
+    growth: Of a push in the nonlinear simulation: it dies out if below 1.
+    overshoot: Of a step of the reference in it, as a share of the step; nan if it left the finite numbers.
+    """
+
+    said: str
+    frequency: float
+    growth: float
+    overshoot: float
+
+
+@dataclass(frozen=True, eq=False)
+class Card:
+    """What is safe for an arm at a rate.
+
+    Attributes
+    ----------
+    robot, rate, delay, task: What it is for; [Hz], [s].
+    sensed: Whether the arm has torque sensors, so that joints can be shaped.
+    postures: (p, n) rad.
+    rows: Largest K_x and its damping, by tool and shaping.
+    clocks: Without shaping, bare flange.
+    shaping: What was found of B_e on the bare flange; None where the arm cannot shape.
+    why_not: Why there is no shaping; empty if there is.
+    inertia: B_e (n,) [kg m²] that bears the tools too.
+    hangs: How the answer hangs on what is assumed, without a margin.
+    folklore: What people say.
+    command: By which the card is made again.
+    """
+
+    robot: FlexibleJointRobot
+    rate: float
+    delay: float
+    task: str
+    sensed: bool
+    postures: Array
+    rows: tuple[Row, ...]
+    clocks: tuple[Clock, ...]
+    shaping: Recommendation | None
+    why_not: str
+    inertia: Array | None
+    hangs: tuple[Hang, ...]
+    folklore: tuple[Told, ...]
+    command: str
+
+    @property
+    def bare(self) -> Row:
+        """Return the border of translation without tool and shaping."""
+        return self.rows[0]
+
+
+@on_one_thread
+def card(
+    robot: FlexibleJointRobot | str | Path,
+    rate: float | str,
+    delay: float | str = 0.0,
+    *,
+    sensed: bool | None = None,
+    report: Report = lambda text: None,
+) -> Card:
+    """Return the card of an arm at a control rate and a delay.
+
+    Parameters
+    ----------
+    robot: Or its name in the catalogue, or the path of its file.
+    rate, delay: [Hz], [s]; text may name a unit.
+    sensed: Whether it has torque sensors; as its file says if left out, and yes where that says nothing.
+    report: Is told what is being done.
+
+    Raises
+    ------
+    PassiflexError
+        For an unknown robot, a rate or delay that makes no sense, an arm without regular postures.
+    """
+    named = robot if not isinstance(robot, FlexibleJointRobot) else robot.name
+    arm = robot if isinstance(robot, FlexibleJointRobot) else FlexibleJointRobot.load(robot)
+    hertz, late = number("rate", rate, RATE), number("delay", delay, DELAY)
+    told = arm.sensed if sensed is None else sensed
+    task = "pose" if arm.n >= LEAST_POSE else "position"
+    report(f"{arm.name}: compiling")
+    places = workspace_postures(arm, PoseTask() if task == "pose" else PositionTask())
+    own = Setting(arm, hertz, late, places, task)
+    rows = [*_rows(own, shaped=False, report=report)]
+    shaping, why = (None, "the arm measures no joint torque") if not told else _shaping(own, report)
+    shaped = own if shaping is None else _shaped(own, shaping)
+    if shaping is not None:
+        rows += _rows(shaped, shaped=True, report=report)
+    report(f"{arm.name}: clocks")
+    clocks = tuple(Clock(k, slowest_clock(own, k), longest_delay(own, k)) for k in STIFFNESSES)
+    report(f"{arm.name}: what it hangs on")
+    hangs = tuple(_hang(own, entry) for entry in ("joint_stiffness", "joint_damping", "motor_inertia"))
+    report(f"{arm.name}: folklore")
+    command = f"passiflex card {named} --rate '{hertz:g} Hz' --delay '{1e3 * late:g} ms'"
+    return Card(
+        robot=arm,
+        rate=hertz,
+        delay=late,
+        task=task,
+        sensed=told,
+        postures=places,
+        rows=tuple(rows),
+        clocks=clocks,
+        shaping=shaping,
+        why_not=why,
+        inertia=shaped.inertia,
+        hangs=hangs,
+        folklore=tuple(_folklore(own)),
+        command=command,
+    )
+
+
+def _rows(setting: Setting, *, shaped: bool, report: Report) -> list[Row]:
+    parts = ("translation", "rotation") if setting.task == "pose" else ("translation",)
+    way = "with shaping" if shaped else "without shaping"
+    out = []
+    for part in parts:
+        report(f"{setting.robot.name}: largest K_x of {part}, {way}")
+        out.append(Row(0.0, shaped, border(setting, part)))
+    for mass in TOOLS:
+        report(f"{setting.robot.name}: largest K_x with {mass:g} kg, {way}")
+        carrying = dataclasses.replace(setting, tool=mass, _members=list(setting.members))
+        out.append(Row(mass, shaped, border(carrying, "translation", searched=False)))
+    return out
+
+
+def _shaping(own: Setting, report: Report) -> tuple[Recommendation | None, str]:
+    """Return gains that shape the joints with a margin, or why there are none."""
+    gains = own.gains(USUAL, ROTATION)
+    try:
+        found = recommend(
+            own.robot, own.rate, own.delay, MARGIN, task=own.task, stiffness=gains["stiffness"],
+            damping=gains["damping"], sensors={"velocity": "differences"}, torque_noise=NOISE,
+            postures=own.postures, report=report,
+        )  # fmt: skip
+    except PassiflexError as error:
+        return None, str(error)
+    return found, ""
+
+
+def _shaped(own: Setting, found: Recommendation) -> Setting:
+    """Return the setting with the B_e that was found, raised for all joints until it bears the tools too."""
+    factor = 1.0
+    while factor < MOST_RAISED:
+        inertia = factor * found.shaped_inertia
+        ways = [
+            dataclasses.replace(own, inner_loop=found.inner_loop, inertia=inertia, tool=mass, _members=[])
+            for mass in (0.0, *TOOLS)
+        ]
+        if all(any(way.holds(way.gains(USUAL, ROTATION, s)) for s in SCALES) for way in ways):
+            break
+        factor *= RAISED
+    return ways[0]
+
+
+def _hang(own: Setting, entry: str) -> Hang:
+    """Return the lowest rate for a usual K_x at both ends of an entry's range, as multiples of that without it."""
+    low, high = own.robot.ranges.get(entry, (0.5, 2.0))
+    middle, ends = slowest_clock(own, USUAL), []
+    for share in (low, high):
+        other = dataclasses.replace(own.robot, **{entry: share * getattr(own.robot, entry)})
+        ends.append(slowest_clock(dataclasses.replace(own, robot=other, _members=[]), USUAL) / middle)
+    return Hang(entry, (low, high), (ends[0], ends[1]), "assumed" in own.robot.sources.get(entry, ""))
+
+
+def _folklore(own: Setting) -> Iterator[Told]:
+    """Yield what becomes of what people say: stiffnesses, and a damping of 2 √K whatever the inertia; simulated."""
+    size = 6 if own.task == "pose" else 3
+    for k in (USUAL, FOLKLORE):
+        K = np.array([k] * 3 + [k / 10] * 3)[:size]
+        careless = {"stiffness": np.diag(K), "damping": np.diag(2 * np.sqrt(K))}
+        yield _simulated(own, f"K_x = {k:g} N/m with D_x = 2 √K_x, whatever the inertia", careless)
+        yield _simulated(own, f"K_x = {k:g} N/m, damped by the inertia that moves", own.gains(k, k / 10))
+
+
+def _simulated(own: Setting, said: str, gains: Mapping[str, Array]) -> Told:
+    """Return what the nonlinear loop does after a step, at the posture and on the robot that like it least."""
+    worst = max(own.members, key=lambda m: own.radius(m, gains))
+    loop, late = own.box.loop(worst)
+    mode = loop.spectrum(1 / own.rate, late, gains)
+    changed = altered(own.box.problems[worst.posture], gains=gains, plant=own.box.plant(worst))
+    quiet = dataclasses.replace(disturbed(changed), delay=late)
+    grown = growth(quiet)
+    goal = moved(changed.home, (0.0, 0.0, STEP), (0.0, 0.0, 0.0))
+    stepped = dataclasses.replace(
+        quiet, events=(Event(0.0, hold(goal), np.zeros(6)),), duration=round(LASTS * own.rate) / own.rate
+    )
+    run = simulate_unchecked(stepped)
+    way = (run["position"][:, 2] - run["position"][0, 2]) / STEP
+    return Told(said, mode.frequency, grown, math.nan if run.failure else float(way.max() - 1))

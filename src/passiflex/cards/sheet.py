@@ -1,0 +1,203 @@
+"""A card in words and tables: what all its forms, text, HTML and PDF, say."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from passiflex.cards.card import FOLKLORE, NOISE, USUAL, Card, Row, Told
+from passiflex.cards.setting import MARGIN, RATIO, ROTATION, TOOL_CENTRE, TRANSLATION
+from passiflex.limits.margin_box import NEAR
+from passiflex.origin import package_version
+from passiflex.robots.once_over import once_over
+from passiflex.stability.clock_words import delay_words, hertz
+
+UNITS = {"translation": ("N/m", "N s/m"), "rotation": ("N m/rad", "N m s/rad")}
+
+
+OTHER = {"translation": "rotation", "rotation": "translation"}
+
+
+class Table(NamedTuple):
+    """A table: what its columns are, and its rows."""
+
+    columns: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+
+
+class Block(NamedTuple):
+    """A part of a card."""
+
+    title: str
+    lines: tuple[str, ...]
+    table: Table | None = None
+
+
+def sheet(card: Card) -> list[Block]:
+    """Return the blocks of a card."""
+    return [
+        _answer(card),
+        _stiffness(card),
+        _clocks(card),
+        _shaping(card),
+        _hangs(card),
+        _folklore(card),
+        _made(card),
+    ]
+
+
+def title(card: Card) -> str:
+    """Return what a card is of."""
+    return f"{card.robot.name} at {hertz(card.rate)} with {delay_words(card.delay * card.rate)}"
+
+
+def _answer(card: Card) -> Block:
+    seen, robot = once_over(card.robot), card.robot
+    motors = card.bare.border
+    safe = _stiff(motors.stiffness, "N/m")
+    lines = [
+        f"Without shaping (K_e = K, B_e = B) the motors' side bears K_x {safe} in translation; limit: {motors.why}.",
+        f"{robot.n} joints, {seen.mass:.3g} kg that move, {seen.reach:.3g} m; motors held, its links swing at "
+        f"{seen.swing:.3g} Hz and more.",
+    ]
+    lines.append(
+        f"Joint springs alone give way as {_compliance(card):.3g} N/m does: nothing at its end effector is stiffer."
+    )
+    assumed = [entry for entry, source in robot.sources.items() if "assumed" in source]
+    if assumed:
+        lines.append(f"Assumed, not measured: {', '.join(assumed)}.")
+    return Block("Answer", tuple(lines))
+
+
+def _compliance(card: Card) -> float:
+    """Return the stiffness of the joints at the end effector, softest direction, on average over the postures [N/m]."""
+    from passiflex.control.posture import posture
+
+    found = []
+    for q in card.postures:
+        J = posture(card.robot, q, card.robot.nominal()).jacobian[:3]
+        found.append(np.linalg.eigvalsh(J @ np.diag(1 / card.robot.joint_stiffness) @ J.T)[-1])
+    return float(1 / np.exp(np.mean(np.log(found))))
+
+
+def _stiffness(card: Card) -> Block:
+    rows = tuple(_row(row, turning=card.task == "pose") for row in card.rows)
+    columns = ("tool", "joints", "of", "largest K_x", "D_x at half of it", "limit")
+    return Block("Largest safe K_x", (), Table(columns, rows))
+
+
+def _row(row: Row, *, turning: bool) -> tuple[str, ...]:
+    b = row.border
+    stiff, damp = UNITS[b.part]
+    low, high, beside = b.damping
+    window = "–" if math.isnan(low) else f"{low:.3g} to {high:.3g} {damp}"
+    if turning and not math.isnan(low):
+        window += f", {beside:.2g} {UNITS[OTHER[b.part]][1]} beside"
+    tool = f"{row.tool:g} kg" if row.tool else "none"
+    return tool, "shaped" if row.shaped else "as they are", b.part, _stiff(b.stiffness, stiff), window, b.why
+
+
+def _stiff(value: float, unit: str) -> str:
+    """Return a stiffness, rounded down."""
+    if value == 0:
+        return "none"
+    if math.isinf(value):
+        return f"of any {unit} that was tried"
+    size = 10.0 ** (math.floor(math.log10(value)) - 1)
+    return f"up to {math.floor(value / size) * size:g} {unit}"
+
+
+def _clocks(card: Card) -> Block:
+    rows = tuple(
+        (
+            f"{c.stiffness:g} N/m",
+            "none" if math.isinf(c.rate) else f"{math.ceil(c.rate):d} Hz",
+            "none" if math.isnan(c.delay) else f"{math.floor(1e4 * c.delay) / 10:g} ms",
+        )
+        for c in card.clocks
+    )
+    periods = delay_words(card.delay * card.rate)
+    return Block(
+        "Lowest rate and longest delay",
+        ("Joints as they are, no tool.",),
+        Table(("K_x", f"lowest rate, {periods}", f"longest delay at {hertz(card.rate)}"), rows),
+    )
+
+
+def _shaping(card: Card) -> Block:
+    if card.shaping is None or card.inertia is None:
+        return Block("Shaping", (f"None: {card.why_not}.",))
+    found, robot = card.shaping, card.robot
+    raised = float((card.inertia / found.shaped_inertia)[0])
+    shares = found.torque_noise / found.torque_limit
+    loudest = int(np.argmax(shares))
+    names = [joint.name for joint in robot.arm.chain.joints]
+    rows = tuple(
+        (name, f"{B:.3g}", f"{B / own:.2g}", why)
+        for name, B, own, why in zip(names, card.inertia, robot.motor_inertia, found.decided_by, strict=True)
+    )
+    more = (
+        f" {raised:.3g} times what the bare flange needs, so that the tools are borne." if raised > 1 else ""
+    )
+    lines = (
+        f"K_e = K with the {found.inner_loop} inner loop.{more}",
+        f"Noise of the torque sensors, {NOISE:g} (N m)^2, makes {found.torque_noise[loudest]:.2g} N m rms in the motor "
+        f"of {names[loudest]}, {100 * shares[loudest]:.0f} % of its limit.",
+    )
+    return Block("Shaping", lines, Table(("joint", "B_e, kg m^2", "B_e/B", "decided by"), rows))
+
+
+def _hangs(card: Card) -> Block:
+    rows = tuple(
+        (
+            h.entry,
+            "assumed" if h.assumed else "from a source",
+            f"{h.shares[0]:.2g} to {h.shares[1]:.2g} times",
+            f"{h.rates[0]:.2g} to {h.rates[1]:.2g} times",
+        )
+        for h in card.hangs
+    )
+    columns = ("number", "known", "looked at", f"lowest rate for {USUAL:g} N/m")
+    return Block("What the answer hangs on", (), Table(columns, rows))
+
+
+def _folklore(card: Card) -> Block:
+    rows = tuple((told.said, *_becomes(told)) for told in card.folklore)
+    return Block(
+        "What people say, simulated",
+        (
+            f"2 √K damping; {FOLKLORE:g} N/m as a typical largest stiffness. A push, and a step of 10 mm, on the robot "
+            "of the margin that likes it least.",
+        ),
+        Table(("gains", "a push", "a step overshoots by"), rows),
+    )
+
+
+def _becomes(told: Told) -> tuple[str, str]:
+    if told.growth >= 1:
+        return f"trembles at {told.frequency:.0f} Hz, and grows", "–"
+    return "dies out", f"{100 * max(told.overshoot, 0):.0f} %"
+
+
+def _made(card: Card) -> Block:
+    task = "pose" if card.task == "pose" else "position, as the arm has too few joints for a pose"
+    return Block("How it was found, and again", tuple(_how(card, task)))
+
+
+def _how(card: Card, task: str) -> Iterator[str]:
+    yield (
+        f"Safe: the sampled loop is stable at {len(card.postures)} postures over the workspace on every robot that was "
+        f"tried of a box: B, K, D and the links' inertia of each joint off by {100 * MARGIN:g} %, the delay by "
+        f"{MARGIN:g} periods, corners and a search uphill (with tools, the robots that decided without), joints up "
+        f"to {NEAR:g} rad beside."
+    )
+    yield (
+        f"Task: {task}. Velocities are differences of readings. The other part of K_x is {ROTATION:g} N m/rad or "
+        f"{TRANSLATION:g} N/m; D_x in steps of 2 around {RATIO:g} of critical by the inertia that moves. A tool is a "
+        f"body {1e3 * TOOL_CENTRE:g} mm above the flange, known to the law."
+    )
+    yield "Not in it: play and stiction, limits of torque, resolution of encoders, contact with anything."
+    yield f"Made by passiflex {package_version()}: {card.command}"

@@ -1,0 +1,54 @@
+"""The picture of a card, the arm where its gains are nearest to their limit, and the card on one page."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.figure import Figure
+
+from passiflex.robots.frames import world_frames
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from passiflex.cards import Card
+
+LINK, JOINT = "#33658a", "#f26419"
+A4 = (8.27, 11.69)
+
+
+def draw_posture(axes: Axes, card: Card) -> None:
+    """Draw the arm from the side, in the plane in which it reaches farthest."""
+    q = card.bare.border.posture
+    points = world_frames(card.robot.arm.chain, np.atleast_2d(q)).position[0]
+    away = points[-1, :2] - points[0, :2]
+    size = float(np.linalg.norm(away))
+    along = away / size if size > 1e-9 else np.array([1.0, 0.0])
+    x, z = points[:, :2] @ along, points[:, 2]
+    axes.plot(x, z, color=LINK, linewidth=4, solid_capstyle="round")
+    axes.plot(x[1:-1], z[1:-1], "o", color=JOINT, markersize=6)
+    axes.plot(x[-1], z[-1], "s", color=JOINT, markersize=5)
+    axes.axhline(points[0, 2], color="0.7", linewidth=1)
+    axes.set_aspect("equal")
+    axes.set_xlabel("m")
+    axes.set_title("where it is nearest to its limit", fontsize=8)
+    axes.tick_params(labelsize=7)
+
+
+def draw_card(card: Card) -> Figure:
+    """Return the picture alone."""
+    figure = Figure(figsize=(3, 3), layout="constrained")
+    FigureCanvasSVG(figure)
+    draw_posture(figure.add_subplot(), card)
+    return figure
+
+
+def draw_page(card: Card, text: str) -> Figure:
+    """Return the card on a page: its text, and the picture in the corner."""
+    figure = Figure(figsize=A4)
+    lines = text.count("\n") + 1
+    figure.text(0.05, 0.97, text, family="monospace", fontsize=min(7.0, 760 / lines), va="top")
+    draw_posture(figure.add_axes((0.72, 0.82, 0.22, 0.15)), card)
+    return figure
