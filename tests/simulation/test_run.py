@@ -149,6 +149,7 @@ def test_the_stored_configuration_is_complete() -> None:
         "sensors",
         "motors",
         "actions",
+        "payload",
     }
     assert configuration["tank"]["initial"] == 2.0
     assert configuration["law"]["regularisation"] == 1e-9

@@ -10,7 +10,7 @@ from pydantic import Field, ValidationInfo, ValidatorFunctionWrapHandler, field_
 
 from passiflex.campaigns.distributions import Distribution
 from passiflex.campaigns.parameters import checked
-from passiflex.campaigns.target import Target, complete_data, locate
+from passiflex.campaigns.target import Target, complete_data, joints_of, locate
 from passiflex.metrics.measures import MEASURES
 from passiflex.scenarios.control_settings import Seconds
 from passiflex.scenarios.scenario import Scenario
@@ -111,7 +111,7 @@ class Campaign(Section):
     @property
     def joints(self) -> int:
         """Return the number of joints."""
-        return len(self.scenario.posture)
+        return joints_of(self.scenario.posture, self.scenario.robot)
 
     def to_yaml(self) -> str:
         """Return the text of a file that loads to an equal campaign: the scenario within, in SI units."""

@@ -10,6 +10,7 @@ from typing import Any, Literal
 
 from pydantic.fields import FieldInfo
 
+from passiflex.robots.catalogue import read_description
 from passiflex.scenarios.scenario import Scenario
 from passiflex.texts.model_mistakes import Model, fields, former_names, models, suggested, tag_field
 from passiflex.texts.quantity import Quantity
@@ -101,8 +102,10 @@ def locate(data: dict[str, Any], path: str) -> Target:
         field = known[part]
         value = value.get(part) if isinstance(value, dict) else None
         here = tuple(models(field.annotation))
-        if not here:
-            return _entry(field, value, tuple(place), path, parts[i + 1 :], len(data["posture"]))
+        if not here or _is_numbers(value):
+            return _entry(
+                field, value, tuple(place), path, parts[i + 1 :], joints_of(data["posture"], data["robot"])
+            )
         if value is None and typing.get_origin(field.annotation) is tuple:
             value = ()
     if isinstance(value, list | tuple):
@@ -111,6 +114,15 @@ def locate(data: dict[str, Any], path: str) -> Target:
         )
     names = [k for m in _decided(here, value) for k in fields(m)]
     raise PathRefusedError(f"is a mapping; add the name of a number in it: {', '.join(names)}")
+
+
+def joints_of(posture: Any, robot: str) -> int:
+    """Return the number of joints of a scenario, whose posture may be a pose."""
+    return len(posture) if isinstance(posture, list | tuple) else read_description(robot).chain.n
+
+
+def _is_numbers(value: Any) -> bool:
+    return isinstance(value, list | tuple) and bool(value) and all(isinstance(v, int | float) for v in value)
 
 
 def _decided(found: tuple[Model, ...], value: Any) -> tuple[Model, ...]:

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Hashable
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
+from scipy.spatial.transform import Rotation
 
 from passiflex.control.law import AbstractLaw
+from passiflex.control.motion import Pose
 from passiflex.control.posture import SINGULAR, held_jacobian, posture
 from passiflex.errors import ArgumentError, SizeError, ValueRangeError
 from passiflex.loops.closed_loop import ClosedLoop
+from passiflex.problems.placed import posture_at
 from passiflex.problems.problem import Noise, Problem, SampledProblem
 from passiflex.problems.sampling import Known, elements_of, sampled_parts
 from passiflex.problems.tank_numbers import tank_gains, tank_start
@@ -19,6 +23,7 @@ from passiflex.problems.timeline import timeline
 from passiflex.robots.carried import carrying
 from passiflex.robots.flexible import FlexibleJointRobot
 from passiflex.scenarios.model_errors import AbstractRelative
+from passiflex.scenarios.posture import AtPose
 from passiflex.scenarios.scenario import Scenario
 from passiflex.scenarios.scenario_file import parse_scenario
 
@@ -36,6 +41,10 @@ SLOWEST_CONTRACTION = 0.1
 """Largest |∇²V| / K_e for the static compensation: its eight steps then reach 1e-8 of the weight."""
 REGULAR = 1e-6
 """Regularisation [1/kg] from which a law may start in a singular posture; the default only guards round-off."""
+
+
+_placed: dict[Hashable, tuple[float, ...]] = {}
+"""Robot, tool and pose → the joint angles that were found."""
 
 
 def resolve(scenario: Scenario, robot: FlexibleJointRobot | None = None) -> Problem:
@@ -56,8 +65,9 @@ def resolve(scenario: Scenario, robot: FlexibleJointRobot | None = None) -> Prob
     else:  # what is stored beside the result must not pass for the scenario's own robot
         scenario = scenario.model_copy(update={"robot": f"{robot.name}, changed in memory"})
     law = scenario.law.build(robot)
-    q = _start(scenario, robot)
     described, plant, model = _robot_numbers(scenario, law)
+    scenario = _with_angles(scenario, robot, described)
+    q = _start(scenario, robot)
     at_start = posture(robot, q, plant)
     _refuse_too_few(law)
     _refuse_singular(scenario, held_jacobian(law.task, at_start))
@@ -111,6 +121,33 @@ def _as_written(scenario: Scenario) -> dict[str, Any]:
         "seed": scenario.seed,
         "text": scenario.to_yaml(),
     }
+
+
+def _with_angles(scenario: Scenario, robot: FlexibleJointRobot, described: dict[str, Array]) -> Scenario:
+    """Return the scenario with joint angles where it has a pose: the run then says which they were."""
+    if not isinstance(scenario.posture, AtPose):
+        return scenario
+    pose, near = scenario.posture.pose, scenario.posture.near
+    turned = pose.rotation_vector is not None
+    if near is not None and len(near) != robot.n:
+        raise SizeError(
+            f"posture.near does not fit robot {robot.name!r}",
+            got=f"{len(near)} angles",
+            needs=f"{robot.n} angles in rad",
+        )
+    turn = Rotation.from_rotvec(pose.rotation_vector or (0.0, 0.0, 0.0)).as_matrix()
+    goal = Pose(np.array(pose.position), turn)
+    key = (
+        robot,
+        described["tool_position"].tobytes(),
+        described["tool_rotation"].tobytes(),
+        scenario.posture,
+    )
+    if key not in _placed:  # as campaigns ask for the same one a thousand times
+        begin = None if near is None else np.array(near)
+        found = posture_at(robot, described, goal, turned=turned, near=begin)
+        _placed[key] = tuple(found.tolist())
+    return scenario.model_copy(update={"posture": _placed[key]})
 
 
 def _start(scenario: Scenario, robot: FlexibleJointRobot) -> Array:

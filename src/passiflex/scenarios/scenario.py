@@ -22,6 +22,7 @@ from passiflex.scenarios.environment import Touching, as_drags
 from passiflex.scenarios.law_settings import LawSettings
 from passiflex.scenarios.model_errors import Deviations, ModelErrors
 from passiflex.scenarios.noise_settings import Noise
+from passiflex.scenarios.posture import StartPosture
 from passiflex.scenarios.reference import ZERO, ReferenceEvent
 from passiflex.scenarios.row_interval import fitting_interval, interval_mistake
 from passiflex.scenarios.spans import Seconds, TimeSpan
@@ -68,8 +69,8 @@ class Scenario(Section):
     robot: str = Field(min_length=1, description="name in the catalogue, or path of a robot file (.yaml)")
     tool: Tool = Field(default=Tool(), description="end effector, seen from the robot's own")
     payload: Payload | None = Field(default=None, description="what the arm has picked up")
-    posture: Annotated[Vector, Quantity("rad", ((None,),))] = Field(
-        description="joint angles at the start, at rest, rad"
+    posture: StartPosture = Field(
+        description="joint angles at the start, at rest, rad; or `{pose: {position: ...}}`, for which they are found"
     )
     law: LawSettings = Field(description="control law")
     control: Control | None = Field(

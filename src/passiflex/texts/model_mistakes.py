@@ -7,7 +7,7 @@ import typing
 from collections.abc import Iterable, Iterator
 from typing import Any, Literal, NamedTuple
 
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel, Discriminator, ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
@@ -147,25 +147,31 @@ def _tag(model: Model) -> str:
 
 
 class _Reached(NamedTuple):
-    """The models at a place: several where a union has not been decided; or the entries of a list or mapping."""
+    """The models at a place: several where a union has not been decided; or the entries of a list or mapping.
+
+    `chosen` says that what follows is the name of a branch that a function chose.
+    """
 
     models: tuple[Model, ...]
     entries: bool = False
+    chosen: bool = False
 
 
 def _steps(loc: Place, root: Model) -> Iterator[tuple[bool, _Reached]]:
     """Yield for each part of a place in the models whether the file has it too, and what it leads to."""
     here = _Reached((root,))
     for part in loc:
-        in_file = here.entries or len(here.models) < 2
-        if here.entries:
+        in_file = not here.chosen and (here.entries or len(here.models) < 2)
+        if here.entries or here.chosen:
             here = _Reached(here.models)
         elif not in_file:
             here = _Reached(tuple(m for m in here.models if part == _tag(m)))
         else:
             field = {k: f for m in here.models for k, f in readable(m).items()}.get(str(part))
             annotation = field.annotation if field else None
-            here = _Reached(tuple(models(annotation)), typing.get_origin(annotation) in (tuple, dict))
+            chosen = field is not None and any(isinstance(m, Discriminator) for m in field.metadata)
+            several = typing.get_origin(annotation) in (tuple, dict)
+            here = _Reached(tuple(models(annotation)), several and not chosen, chosen)
         yield in_file, here
 
 
