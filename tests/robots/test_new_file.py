@@ -16,6 +16,7 @@ from passiflex.robots.drives import DRIVES, drive_of
 from passiflex.robots.flexible import FlexibleJointRobot
 from passiflex.robots.new_file import new_robot_file
 from passiflex.robots.once_over import oddities, once_over
+from passiflex.robots.xacro import expanded
 from robots.test_chain_choice import tree, two_arms
 
 PUBLISHED = {
@@ -127,3 +128,27 @@ def test_the_two_commands_write_a_file_and_look_it_over(
     assert "try left_tool, right_tool" in several.err.replace("\n", " ")
     one = shell("robot", "new", "two.urdf", "--end-effector", "right_tool")
     assert one.status == 0, one.err
+
+
+def test_a_template_of_xacro_is_expanded_where_its_package_is(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    pytest.importorskip("xacrodoc")
+    head = '<robot name="tree" xmlns:xacro="http://www.ros.org/wiki/xacro">'
+    head += '<xacro:property name="most" value="${5 * 2}"/>'
+    text = tree(4).replace('<robot name="tree">', head).replace('effort="10"', 'effort="${most}"')
+    (tmp_path / "arm.urdf.xacro").write_text(text)
+    monkeypatch.chdir(tmp_path)
+    made = Shell(monkeypatch, capsys)("robot", "new", "arm.urdf.xacro")
+    assert made.status == 0, made.err
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        np.testing.assert_array_equal(FlexibleJointRobot.load(tmp_path / "arm.yaml").torque_limit, [10] * 4)
+
+
+def test_without_the_package_a_template_is_refused_with_how_to_get_it(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr("passiflex.robots.xacro.find_spec", lambda name: None)
+    with pytest.raises(RobotError, match=r"is a xacro template; needs plain URDF; try pip install"):
+        expanded(tmp_path / "arm.xacro", tmp_path)
