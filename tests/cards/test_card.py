@@ -15,7 +15,7 @@ import pytest
 import passiflex as pf
 from cli.shell import Shell
 from passiflex.cards import Card
-from passiflex.cards.border import border, damping_window, longest_delay, slowest_clock, stiffness_of
+from passiflex.cards.border import SCALES, border, damping_window, longest_delay, slowest_clock, stiffness_of
 from passiflex.cards.setting import Setting
 from passiflex.cards.sheet import sheet
 from passiflex.control.task import PositionTask
@@ -95,12 +95,22 @@ def test_the_slowest_clock_and_the_longest_delay_are_borders() -> None:
     rate, delay = slowest_clock(s, k), longest_delay(s, k)
     assert rate < RATE
     assert delay > DELAY
-    gains = [s.gains(k, 30.0, scales) for scales in ((1.0, 1.0), (0.5, 1.0), (0.5, 0.5), (1.0, 0.5))]
+    gains = [s.gains(k, 30.0, scales) for scales in SCALES]
     assert any(s.holds(g, 1 / rate, 1 / rate) for g in gains)
     assert not any(s.holds(g, 1 / (0.9 * rate), 1 / (0.9 * rate)) for g in gains)
     assert not any(s.holds(g, 1 / RATE, delay + 0.1 / RATE) for g in gains)
+    for faster in np.geomspace(1.01 * rate, 5000, 12):  # what holds at the border holds on this side of it
+        assert any(s.holds(g, 1 / faster, 1 / faster) for g in gains)
+    for less in np.linspace(0, delay, 8):
+        assert any(s.holds(g, 1 / RATE, less) for g in gains)
     assert math.isnan(longest_delay(s, 1e6))
     assert math.isnan(damping_window(s, "translation", 1e6).least)
+
+
+def test_what_no_search_has_passed_is_not_called_safe(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Setting, "searched", lambda self, gains: False)
+    assert border(setting(), "translation").stiffness == 0
+    assert border(setting(), "translation", searched=False).stiffness > 10
 
 
 def test_a_card_says_it_all_on_one_page() -> None:

@@ -16,20 +16,20 @@ Array = NDArray[np.float64]
 
 STIFFEST = {"translation": 30_000.0, "rotation": 3_000.0}
 """[N/m], [N m/rad] Nothing stiffer is looked for: the springs of the joints are softer."""
-USUAL = {
+BEGUN = {
     "translation": (1000.0, 300.0, 3000.0, 100.0, 10_000.0, 30.0),
     "rotation": (30.0, 100.0, 10.0, 300.0, 3.0, 1.0),
 }
-"""From which on the largest one is looked for: the first that holds."""
+"""K_x from which on the largest one is looked for: the first that holds [N/m], [N m/rad]."""
 SCALES: tuple[Scales, ...] = (
     (1.0, 1.0), (0.5, 1.0), (0.5, 0.5), (1.0, 0.5), (2.0, 1.0), (0.25, 1.0), (0.25, 0.5), (0.25, 0.25), (0.125, 0.5),
     (4.0, 1.0), (2.0, 2.0), (1.0, 2.0),
 )  # fmt: skip
 """Multiples of the designed damping that are tried, of translation and rotation, the likeliest first."""
-FEW = 4
-"""Of them, where they are tried at many clocks."""
 WIDEST = 64.0
 """How many times the damping is raised or lowered at most."""
+STEP = 1.15
+"""Ratio of two values that are tried: beyond what does not hold something may hold again, as a low rate does."""
 FINE = 1.04
 """Ratio to which a border is found."""
 LOWERED = 0.8
@@ -58,7 +58,7 @@ class Border(NamedTuple):
     Attributes
     ----------
     part: translation or rotation.
-    stiffness: [N/m] or [N m/rad]; 0 if nothing holds, infinite if all that was looked at does.
+    stiffness: [N/m] or [N m/rad]; 0 if nothing was found that holds, infinite if all up to `STIFFEST` does.
     damping: What D_x may be at half of it.
     mode: What does not die out beyond.
     joint: Whose name.
@@ -97,16 +97,18 @@ def border(setting: Setting, part: str, *, searched: bool = True) -> Border:
         pair = stiffness_of(part, k)
         return next((s for s in SCALES if setting.holds(setting.gains(*pair, s))), None)
 
-    begun = next((k for k in USUAL[part] if scale_for(k) is not None), 0.0)
+    begun = next((k for k in BEGUN[part] if scale_for(k) is not None), 0.0)
     most = _largest(lambda k: scale_for(k) is not None, begun, STIFFEST[part]) if begun else 0.0
     for _ in range(SEARCHES if most and searched else 0):
         scale = scale_for(most)
         if scale is not None and setting.searched(setting.gains(*stiffness_of(part, most), scale)):
             break
         most *= LOWERED
+    else:
+        most = most if not searched else 0.0  # what no search has passed is not called safe
     if not most:
         return Border(
-            part, 0.0, Window(math.nan, math.nan, math.nan), *_failing(setting, part, USUAL[part][0])
+            part, 0.0, Window(math.nan, math.nan, math.nan), *_failing(setting, part, BEGUN[part][0])
         )
     window = damping_window(setting, part, most / 2)
     if most >= STIFFEST[part]:
@@ -137,9 +139,7 @@ def slowest_clock(setting: Setting, k: float) -> float:
     periods = setting.delay * setting.rate
 
     def holds(rate: float) -> bool:
-        return any(
-            setting.holds(setting.gains(k, ROTATION, s), 1 / rate, periods / rate) for s in SCALES[:FEW]
-        )
+        return any(setting.holds(setting.gains(k, ROTATION, s), 1 / rate, periods / rate) for s in SCALES)
 
     if not holds(FASTEST):
         return math.inf
@@ -151,11 +151,13 @@ def longest_delay(setting: Setting, k: float) -> float:
     period = 1 / setting.rate
 
     def holds(delay: float) -> bool:
-        return any(setting.holds(setting.gains(k, ROTATION, s), period, delay) for s in SCALES[:FEW])
+        return any(setting.holds(setting.gains(k, ROTATION, s), period, delay) for s in SCALES)
 
     if not holds(0.0):
         return math.nan
-    low, high = 0.0, LATEST * period
+    low, high = 0.0, period
+    while high < LATEST * period and holds(high):  # upward, as what is later still may hold again
+        low, high = high, high + period
     while high - low > period / 20:
         middle = (low + high) / 2
         low, high = (middle, high) if holds(middle) else (low, middle)
@@ -181,12 +183,11 @@ def _failing(setting: Setting, part: str, k: float) -> tuple[Spectrum, str, Arra
 
 
 def _largest(holds: Callable[[float], bool], low: float, high: float) -> float:
-    """Return the largest value up to `high` that holds, from `low` on by doubling and halving; 0 if `low` does not."""
+    """Return the largest value up to `high` that holds, walking up from `low`; 0 if that does not."""
     if not holds(low):
         return 0.0
-    step = 4.0
     while low < high:
-        beyond = min(low * step, high)
+        beyond = min(low * STEP, high)
         if not holds(beyond):
             break
         low = beyond

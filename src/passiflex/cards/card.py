@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import shlex
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -35,7 +36,7 @@ TOOLS = (0.5, 1.0, 2.0)
 STIFFNESSES = (200.0, 500.0, 1000.0, 3000.0)
 """[N/m] For which the slowest clock and the longest delay are looked for."""
 USUAL = 1000.0
-"""[N/m]"""
+"""[N/m] For which the joints are shaped, and at which it is seen what the answer hangs on."""
 FOLKLORE = 5000.0
 """[N/m] What people call a typical largest stiffness."""
 RAISED, MOST_RAISED = 1.15, 16.0
@@ -104,7 +105,7 @@ class Card:
     shaping: What was found of B_e on the bare flange; None where the arm cannot shape.
     why_not: Why there is no shaping; empty if there is.
     inertia: B_e (n,) [kg m²] that bears the tools too.
-    hangs: How the answer hangs on what is assumed, without a margin.
+    hangs: How the lowest rate hangs on what is assumed.
     folklore: What people say.
     command: By which the card is made again.
     """
@@ -163,15 +164,17 @@ def card(
     own = Setting(arm, hertz, late, places, task)
     rows = [*_rows(own, shaped=False, report=report)]
     shaping, why = (None, "the arm measures no joint torque") if not told else _shaping(own, report)
-    shaped = own if shaping is None else _shaped(own, shaping)
-    if shaping is not None:
+    shaped = None if shaping is None else _shaped(own, shaping)
+    if shaped is None:
+        shaping, why = None, why or f"no B_e was found that bears tools of up to {TOOLS[-1]:g} kg"
+    else:
         rows += _rows(shaped, shaped=True, report=report)
     report(f"{arm.name}: clocks")
     clocks = tuple(Clock(k, slowest_clock(own, k), longest_delay(own, k)) for k in STIFFNESSES)
     report(f"{arm.name}: what it hangs on")
     hangs = tuple(_hang(own, entry) for entry in ("joint_stiffness", "joint_damping", "motor_inertia"))
     report(f"{arm.name}: folklore")
-    command = f"passiflex card {named} --rate '{hertz:g} Hz' --delay '{1e3 * late:g} ms'"
+    command = f"passiflex card {shlex.quote(str(named))} --rate '{hertz:g} Hz' --delay '{1e3 * late:g} ms'"
     return Card(
         robot=arm,
         rate=hertz,
@@ -183,7 +186,7 @@ def card(
         clocks=clocks,
         shaping=shaping,
         why_not=why,
-        inertia=shaped.inertia,
+        inertia=None if shaped is None else shaped.inertia,
         hangs=hangs,
         folklore=tuple(_folklore(own)),
         command=command,
@@ -218,8 +221,8 @@ def _shaping(own: Setting, report: Report) -> tuple[Recommendation | None, str]:
     return found, ""
 
 
-def _shaped(own: Setting, found: Recommendation) -> Setting:
-    """Return the setting with the B_e that was found, raised for all joints until it bears the tools too."""
+def _shaped(own: Setting, found: Recommendation) -> Setting | None:
+    """Return the setting with the B_e that was found, raised for all joints until it bears the tools, if any does."""
     factor = 1.0
     while factor < MOST_RAISED:
         inertia = factor * found.shaped_inertia
@@ -228,9 +231,9 @@ def _shaped(own: Setting, found: Recommendation) -> Setting:
             for mass in (0.0, *TOOLS)
         ]
         if all(any(way.holds(way.gains(USUAL, ROTATION, s)) for s in SCALES) for way in ways):
-            break
+            return ways[0]
         factor *= RAISED
-    return ways[0]
+    return None
 
 
 def _hang(own: Setting, entry: str) -> Hang:

@@ -8,8 +8,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from passiflex.cards.border import STIFFEST
 from passiflex.cards.card import FOLKLORE, NOISE, USUAL, Card, Row, Told
 from passiflex.cards.setting import MARGIN, RATIO, ROTATION, TOOL_CENTRE, TRANSLATION
+from passiflex.control.posture import posture
 from passiflex.limits.margin_box import NEAR
 from passiflex.origin import package_version
 from passiflex.robots.once_over import once_over
@@ -57,7 +59,7 @@ def title(card: Card) -> str:
 def _answer(card: Card) -> Block:
     seen, robot = once_over(card.robot), card.robot
     motors = card.bare.border
-    safe = _stiff(motors.stiffness, "N/m")
+    safe = _stiff(motors.stiffness, "translation")
     lines = [
         f"Without shaping (K_e = K, B_e = B) the motors' side bears K_x {safe} in translation; limit: {motors.why}.",
         f"{robot.n} joints, {seen.mass:.3g} kg that move, {seen.reach:.3g} m; motors held, its links swing at "
@@ -74,8 +76,6 @@ def _answer(card: Card) -> Block:
 
 def _compliance(card: Card) -> float:
     """Return the stiffness of the joints at the end effector, softest direction, on average over the postures [N/m]."""
-    from passiflex.control.posture import posture
-
     found = []
     for q in card.postures:
         J = posture(card.robot, q, card.robot.nominal()).jacobian[:3]
@@ -91,21 +91,22 @@ def _stiffness(card: Card) -> Block:
 
 def _row(row: Row, *, turning: bool) -> tuple[str, ...]:
     b = row.border
-    stiff, damp = UNITS[b.part]
+    damp = UNITS[b.part][1]
     low, high, beside = b.damping
     window = "–" if math.isnan(low) else f"{low:.3g} to {high:.3g} {damp}"
     if turning and not math.isnan(low):
         window += f", {beside:.2g} {UNITS[OTHER[b.part]][1]} beside"
     tool = f"{row.tool:g} kg" if row.tool else "none"
-    return tool, "shaped" if row.shaped else "as they are", b.part, _stiff(b.stiffness, stiff), window, b.why
+    return tool, "shaped" if row.shaped else "as they are", b.part, _stiff(b.stiffness, b.part), window, b.why
 
 
-def _stiff(value: float, unit: str) -> str:
+def _stiff(value: float, part: str) -> str:
     """Return a stiffness, rounded down."""
+    unit, most = UNITS[part][0], STIFFEST[part]
     if value == 0:
         return "none"
     if math.isinf(value):
-        return f"of any {unit} that was tried"
+        return f"up to {most:g} {unit} and more"
     size = 10.0 ** (math.floor(math.log10(value)) - 1)
     return f"up to {math.floor(value / size) * size:g} {unit}"
 
@@ -179,6 +180,8 @@ def _folklore(card: Card) -> Block:
 def _becomes(told: Told) -> tuple[str, str]:
     if told.growth >= 1:
         return f"trembles at {told.frequency:.0f} Hz, and grows", "–"
+    if math.isnan(told.overshoot):
+        return "dies out", "–"
     return "dies out", f"{100 * max(told.overshoot, 0):.0f} %"
 
 

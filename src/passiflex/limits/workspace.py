@@ -9,14 +9,13 @@ from passiflex.control.posture import held_jacobian, posture
 from passiflex.control.task import AbstractTask
 from passiflex.errors import ValueRangeError
 from passiflex.robots.flexible import FlexibleJointRobot
+from passiflex.robots.once_over import bounded
 
 Array = NDArray[np.float64]
 
 COUNT = 6
 USED = 0.6
 """Share of a joint's range that the postures use, around its middle."""
-ENDLESS = np.pi
-"""Half the range [rad, m] of a joint without limits."""
 REGULAR = 0.05
 """Least ratio of the singular values of the task's Jacobian, its lengths in units of the arm's reach."""
 TRIED = 512
@@ -35,7 +34,7 @@ def workspace_postures(robot: FlexibleJointRobot, task: AbstractTask, count: int
     from scipy.stats import qmc  # takes a second
 
     numbers = robot.nominal()
-    limits = np.clip(robot.position_limit, -ENDLESS, ENDLESS)
+    limits = bounded(robot.position_limit)
     middle, half = limits.mean(axis=1), USED * np.diff(limits, axis=1)[:, 0] / 2
     sequence = qmc.Halton(robot.n, scramble=False).fast_forward(1).random(TRIED)  # the first is a corner
     points = middle + half * (2 * sequence - 1)

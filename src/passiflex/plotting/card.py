@@ -31,6 +31,8 @@ def draw_posture(axes: Axes, card: Card) -> None:
     axes.plot(x[1:-1], z[1:-1], "o", color=JOINT, markersize=6)
     axes.plot(x[-1], z[-1], "s", color=JOINT, markersize=5)
     axes.axhline(points[0, 2], color="0.7", linewidth=1)
+    middle, half = (x.min() + x.max()) / 2, max(np.ptp(x), np.ptp(z)) / 2
+    axes.set_xlim(middle - 1.1 * half, middle + 1.1 * half)
     axes.set_aspect("equal")
     axes.set_xlabel("m")
     axes.set_title("where it is nearest to its limit", fontsize=8)

@@ -13,6 +13,7 @@ from passiflex.control.motion import Pose
 from passiflex.control.posture import posture
 from passiflex.errors import ValueRangeError
 from passiflex.robots.flexible import FlexibleJointRobot
+from passiflex.robots.once_over import bounded
 
 Array = NDArray[np.float64]
 
@@ -24,8 +25,6 @@ REACHED = 1e-9
 """[m, rad] Off the pose by less, it is reached."""
 LIGHT, HEAVY = 1e-12, 1e6
 """Between which the damping of a step is, m² or rad²."""
-ENDLESS = np.pi
-"""Half the range [rad, m] from which seeds of a joint without limits are drawn."""
 
 
 class _Found(NamedTuple):
@@ -58,7 +57,7 @@ def posture_at(
         If none is found within the joints' limits; the message says how near the nearest one comes.
     """
     low, high = robot.position_limit.T
-    begin = np.clip(robot.position_limit, -ENDLESS, ENDLESS)
+    begin = bounded(robot.position_limit)
     least, most = begin.T
     drawn = np.random.default_rng(0).uniform(least, most, (SEEDS, robot.n))
     seeds = [begin.mean(axis=1), *drawn] if near is None else [near, *drawn]

@@ -12,6 +12,8 @@ from passiflex.errors import RobotError
 
 Array = NDArray[np.float64]
 
+PRINTED = 1e-3
+"""Share by which moments may miss the triangle inequality, as they do when they are printed with few digits."""
 ROUND_OFF = 1e-12
 """A principal moment below this fraction of the largest one counts as zero."""
 

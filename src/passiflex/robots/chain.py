@@ -20,6 +20,7 @@ from scipy.spatial.transform import Rotation
 from passiflex.errors import NameUnknownError, PassiflexWarning, RobotError
 from passiflex.robots.bodies import (
     HERE,
+    PRINTED,
     Array,
     Body,
     Placement,
@@ -37,8 +38,6 @@ from passiflex.robots.urdf_parts import COMPONENTS, LIMITS, UNLIMITED, Edge, Joi
 MOST_JOINTS = 100
 DOWN = (0.0, 0.0, -9.81)
 """Gravitational acceleration in a world whose z points up [m/s²]."""
-PRINTED = 1e-3
-"""Share by which moments may miss the triangle inequality, as they do when they are printed with few digits."""
 
 
 @dataclass(frozen=True, eq=False)

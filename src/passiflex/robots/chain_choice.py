@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from passiflex.errors import NameUnknownError, RobotError
 from passiflex.robots.bodies import HERE, Placement, rotation_of
@@ -65,12 +66,12 @@ class Tree:
             link = self.above[link].parent
         return out[::-1]
 
-    def fixed_to(self, link: str, frozen: Sequence[str] = ()) -> Iterator[str]:
-        """Yield a link and all that are fixed to it, or would be if some joints were."""
+    def fixed_to(self, link: str) -> Iterator[str]:
+        """Yield a link and all that are fixed to it."""
         queue = [link]
         for parent in queue:
             yield parent
-            queue += [e.child for e in self.children[parent] if e.fixed or e.joint.name in frozen]
+            queue += [e.child for e in self.children[parent] if e.fixed]
 
     @property
     def ends(self) -> list[list[Edge]]:
@@ -82,10 +83,10 @@ class Tree:
                 driven = self.path(link)
                 free = [i for i, e in enumerate(driven) if e.passive and not e.mimics]
                 driven = driven[free[-1] + 1 :] if free else driven
-                out.append(self._without_gripper(driven))
+                out.append(self.without_gripper(driven))
         return out
 
-    def _without_gripper(self, path: list[Edge]) -> list[Edge]:
+    def without_gripper(self, path: list[Edge]) -> list[Edge]:
         """Return a path without joints at its end that are a gripper's: called so, or leading others."""
         moving = [e for e in path if not e.fixed]
         while len(moving) > LEAST_ARM:
@@ -149,7 +150,7 @@ def _longest(tree: Tree, base: str | None) -> list[Edge]:
     if base is not None:
         below = set(_below(tree, base))
         ends = [
-            tree._without_gripper(tree.path(p[-1].child, base)) for p in ends if p and p[-1].child in below
+            tree.without_gripper(tree.path(p[-1].child, base)) for p in ends if p and p[-1].child in below
         ]
     counted = [(sum(not e.fixed for e in path), path) for path in ends]
     most = max((count for count, _ in counted), default=0)
@@ -225,8 +226,6 @@ def moved(joint: Joint, value: float) -> Placement:
         return Placement(joint.xyz, R)
     if joint.kind == "prismatic":
         return Placement(joint.xyz + R @ (value * joint.axis), R)
-    from scipy.spatial.transform import Rotation
-
     return Placement(joint.xyz, R @ Rotation.from_rotvec(value * joint.axis).as_matrix())
 
 

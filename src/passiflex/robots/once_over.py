@@ -43,9 +43,14 @@ class OnceOver(NamedTuple):
     resonance: float
 
 
+def bounded(limits: Array) -> Array:
+    """Return the limits of joints (n, 2), with half a turn [rad] or that many metres where there are none nearer."""
+    return np.clip(limits, -ENDLESS, ENDLESS)
+
+
 def postures_of(chain: SerialChain, limits: Array, count: int = POSTURES) -> Array:
     """Return zero, and postures drawn within the limits (count + 1, n)."""
-    low, high = np.clip(limits, -ENDLESS, ENDLESS).T
+    low, high = bounded(limits).T
     middle = np.clip(0.0, low, high)
     return np.vstack([middle, np.random.default_rng(0).uniform(low, high, (count, chain.n))])
 

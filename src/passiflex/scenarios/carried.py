@@ -14,9 +14,6 @@ from passiflex.texts.section import Mistakes, Section
 if TYPE_CHECKING:
     from passiflex.robots.bodies import Body
 
-PRINTED = 1e-3
-"""Share by which moments may miss the triangle inequality, as they do when they are printed with few digits."""
-
 
 class Carried(Section):
     """A body on the flange: in the axes of the robot's own end effector."""
@@ -42,9 +39,10 @@ class Carried(Section):
 
     @model_validator(mode="after")
     def _of_matter(self) -> Self:
-        xx, yy, zz, xy, xz, yz = self._moments
-        moments = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-        if moments[0] < 0 or moments[0] + moments[1] < moments[2] * (1 - PRINTED):
+        from passiflex.robots.bodies import PRINTED, matrix, triangle_defect
+
+        moments = np.linalg.eigvalsh(matrix(self.body.inertia))
+        if moments[0] < 0 or triangle_defect(self.body, PRINTED):
             needs = "three moments, none larger than the sum of the others"
             raise Mistakes(
                 (("inertia",), f"is of no body: principal moments {moments.round(6).tolist()}; {needs}")
