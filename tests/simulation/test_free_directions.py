@@ -157,7 +157,8 @@ def test_a_pose_on_five_joints_is_refused_with_what_to_do() -> None:
     assert str(error.value) == (
         "task 'pose' holds 6 directions, more than robot 'five' can move in; got 5 joints; "
         "needs at least as many joints as directions that are held; "
-        "try task: position, or free directions: stiffness and damping 0 in them, as rotation: [30, 30, 0]"
+        "try rotation: [0, 30, 30] in stiffness and damping, so that the end effector is free to turn about its x, "
+        "about which the arm can turn it least at this start; or task: position"
     )
 
 

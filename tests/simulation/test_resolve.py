@@ -112,15 +112,16 @@ STRAIGHT = [0.0] * 7
 
 @pytest.mark.parametrize("regularisation", [0, 1e-9])
 def test_a_singular_posture_without_regularisation(regularisation: float) -> None:
-    """The default ε guards round-off only; to start where J is singular, ε must be meant."""
+    """To start where J is singular, ε must not be a guard of round-off only, as the default is not."""
     message = refused(ValueRangeError, posture=STRAIGHT, law={"regularisation": regularisation})
     assert message.startswith("posture is singular for task 'pose'; got smallest singular value of J ")
     assert message.endswith("try another posture, task: position, or regularisation of 1e-06 1/kg or more")
 
 
-def test_a_singular_posture_with_regularisation() -> None:
+@pytest.mark.parametrize("more", [{"regularisation": 1e-3}, {}])
+def test_a_singular_posture_with_regularisation(more: dict[str, float]) -> None:
     """ε > 0 bounds Λ there, and with it the damping that a ratio asks for."""
-    p = problem(posture=STRAIGHT, law={"regularisation": 1e-3, "damping": {"ratio": 0.7}})
+    p = problem(posture=STRAIGHT, law={"damping": {"ratio": 0.7}} | more)
     assert np.isfinite(p.gains).all()
     assert np.linalg.eigvalsh(gains(p)["damping"]).min() > 0
 
@@ -193,7 +194,8 @@ def test_damping_by_ratio_damps_every_mode_alike(ratio: float) -> None:
     At ζ = 1 the poles are double, and found to the square root of the rounding only.
     """
     stiffness = {"translation": [60, 600, 6000], "rotation": 20}
-    p = problem(law={"stiffness": stiffness, "damping": {"ratio": ratio}}, model_errors=RIGID_JOINTS)
+    law = {"stiffness": stiffness, "damping": {"ratio": ratio}, "regularisation": 1e-9}
+    p = problem(law=law, model_errors=RIGID_JOINTS)
     g, inertia = gains(p), moving_inertia(p)
     zero, one = np.zeros((6, 6)), np.eye(6)
     A = np.block(
@@ -479,7 +481,8 @@ def test_static_gravity_refuses_joints_that_are_too_soft_for_its_fixed_point() -
 def test_damping_by_ratio_holds_for_anisotropic_rotation() -> None:
     """K_o is given in the axes of the reference, Λ and D_x are in world axes: the modes of the true Hessian count."""
     stiffness = {"translation": [60, 600, 6000], "rotation": [100, 10, 1]}
-    p = problem(law={"stiffness": stiffness, "damping": {"ratio": 0.7}}, model_errors=RIGID_JOINTS)
+    law = {"stiffness": stiffness, "damping": {"ratio": 0.7}, "regularisation": 1e-9}
+    p = problem(law=law, model_errors=RIGID_JOINTS)
     g, inertia, R = gains(p), moving_inertia(p), p.home.rotation
     assert np.abs(R - np.eye(3)).max() > 0.5  # else the frames would be the same
     hessian = np.zeros((6, 6))

@@ -152,7 +152,7 @@ def test_the_stored_configuration_is_complete() -> None:
         "payload",
     }
     assert configuration["tank"]["initial"] == 2.0
-    assert configuration["law"]["regularisation"] == 1e-9
+    assert configuration["law"]["regularisation"] == pytest.approx(0.01 / 5)  # kg of the two links
     assert configuration["tolerance"] == 1e-9
 
 

@@ -73,7 +73,7 @@ def test_a_complete_file():
     s = parse_scenario(GOOD)
     assert isinstance(s.law, ImpedanceSettings)
     assert s.law.gravity == "static"
-    assert s.law.regularisation == 1e-9
+    assert s.law.regularisation is None  # settled with the robot
     assert s.law.shaped_inertia.value == (0.1, 0.2)
     np.testing.assert_array_equal(s.law.shaped_stiffness.resolve([1.0, 2.0]), [10.0, 20.0])
     np.testing.assert_array_equal(s.law.shaped_inertia.resolve([5.0, 5.0]), [0.1, 0.2])

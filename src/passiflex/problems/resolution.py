@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from passiflex.control.law import AbstractLaw
 from passiflex.control.motion import Pose
-from passiflex.control.posture import SINGULAR, held_jacobian, posture
+from passiflex.control.posture import SINGULAR, Posture, freest_turns, held_jacobian, posture
 from passiflex.errors import ArgumentError, SizeError, ValueRangeError
 from passiflex.loops.closed_loop import ClosedLoop
 from passiflex.problems.placed import posture_at
@@ -40,7 +40,7 @@ SCALED = {
 SLOWEST_CONTRACTION = 0.1
 """Largest |∇²V| / K_e for the static compensation: its eight steps then reach 1e-8 of the weight."""
 REGULAR = 1e-6
-"""Regularisation [1/kg] from which a law may start in a singular posture; the default only guards round-off."""
+"""Regularisation [1/kg] from which a law may start in a singular posture; less only guards round-off."""
 
 
 _placed: dict[Hashable, tuple[float, ...]] = {}
@@ -67,9 +67,10 @@ def resolve(scenario: Scenario, robot: FlexibleJointRobot | None = None) -> Prob
     law = scenario.law.build(robot)
     described, plant, model = _robot_numbers(scenario, law)
     scenario = _with_angles(scenario, robot, described)
+    scenario = scenario.model_copy(update={"law": scenario.law.settled(float(described["link_mass"].sum()))})
     q = _start(scenario, robot)
     at_start = posture(robot, q, plant)
-    _refuse_too_few(law)
+    _refuse_too_few(law, at_start)
     _refuse_singular(scenario, held_jacobian(law.task, at_start))
     gains = scenario.law.gains(law, model, posture(robot, q, model))
     if law.gravity.searches and law.shapes:
@@ -171,15 +172,19 @@ def _start(scenario: Scenario, robot: FlexibleJointRobot) -> Array:
     return q
 
 
-def _refuse_too_few(law: AbstractLaw) -> None:
+def _refuse_too_few(law: AbstractLaw, at_start: Posture) -> None:
     """Raise ValueRangeError for a pose that has more directions to hold than the robot has joints."""
-    held = len(law.task.held)
-    if law.task.turns and law.robot.n < held:
+    held, n = len(law.task.held), law.robot.n
+    if law.task.turns and n < held:
+        turns = freest_turns(at_start, min(6 - n, 3))
+        names = " and ".join("xyz"[i] for i in turns)
+        written = ", ".join("0" if i in turns else "30" for i in range(3))
         raise ValueRangeError(
             f"task 'pose' holds {held} directions, more than robot {law.robot.name!r} can move in",
-            got=f"{law.robot.n} joints",
+            got=f"{n} joints",
             needs="at least as many joints as directions that are held",
-            try_="task: position, or free directions: stiffness and damping 0 in them, as rotation: [30, 30, 0]",
+            try_=f"rotation: [{written}] in stiffness and damping, so that the end effector is free to turn about its "
+            f"{names}, about which the arm can turn it least at this start; or task: position",
         )
 
 
@@ -187,7 +192,7 @@ def _refuse_singular(scenario: Scenario, jacobian: Array) -> None:
     """Raise ValueRangeError where Λ of (31) does not exist and the law needs it."""
     values = np.linalg.svd(jacobian, compute_uv=False)
     enough = values.size == len(jacobian)
-    rigid, regularisation = not scenario.law.shapes, scenario.law.regularisation
+    rigid, regularisation = not scenario.law.shapes, scenario.law.regularisation or 0.0
     if values[-1] >= SINGULAR * values[0] and (enough or (regularisation > 0 and not rigid)):
         return
     if regularisation >= REGULAR and not rigid:

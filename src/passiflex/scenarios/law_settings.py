@@ -30,6 +30,13 @@ if TYPE_CHECKING:
 
 Numbers = dict[str, NDArray[np.float64]]
 
+KIND = 0.01
+"""What is added to the mobility where J loses a rank, unless a scenario says: a share of 1/m, m the mass that moves."""
+LEAST_MASS = 1e-3
+"""[kg] Nothing lighter is taken for the mass of a robot."""
+EXACT = 1e-9
+"""[1/kg] What the rigid law adds: it only guards round-off, as more would not be the inertia that is asked for."""
+
 
 class AbstractLawSettings(Section, abc.ABC):
     """What all laws have.
@@ -48,8 +55,9 @@ class AbstractLawSettings(Section, abc.ABC):
     null_space_damping: Annotated[float, Quantity("1/s", least=0)] = Field(
         default=0.0, description="damping k_ns of the self-motion, 1/s"
     )
-    regularisation: Annotated[float, Quantity("1/kg", least=0)] = Field(
-        default=1e-9, description="ε of Λ = (J M⁻¹ Jᵀ + ε I)⁻¹, 1/kg"
+    regularisation: Annotated[float, Quantity("1/kg", least=0)] | None = Field(
+        default=None,
+        description="ε of Λ = (J M⁻¹ Jᵀ + ε I)⁻¹, 1/kg; 1 % of 1/m if left out, m the mass that moves",
     )
 
     @field_validator("stiffness", "damping", "target_inertia", check_fields=False)
@@ -70,6 +78,16 @@ class AbstractLawSettings(Section, abc.ABC):
     def build(self, robot: FlexibleJointRobot) -> AbstractLaw:
         """Return the law."""
 
+    def settled(self, mass: float) -> Self:
+        """Return the settings with a regularisation, for a robot of which so much moves [kg]."""
+        if self.regularisation is not None:
+            return self
+        return self.model_copy(update={"regularisation": self._kind(mass)})
+
+    def _kind(self, mass: float) -> float:
+        """Return the regularisation with which nothing turns at once where J loses a rank [1/kg]."""
+        return KIND / max(mass, LEAST_MASS)
+
     @abc.abstractmethod
     def gains(self, law: AbstractLaw, model: Numbers, start: Posture) -> Numbers:
         """Return the numbers of `law.layout`, with the law's model and the start posture as that model sees it.
@@ -84,7 +102,7 @@ class AbstractLawSettings(Section, abc.ABC):
         return {
             "stiffness": self.stiffness.full(),
             "null_space_damping": np.asarray(self.null_space_damping),
-            "regularisation": np.asarray(self.regularisation),
+            "regularisation": np.asarray(self.regularisation, dtype=np.float64),
         }
 
     def _task(self) -> AbstractTask:
@@ -164,6 +182,9 @@ class RigidSettings(AbstractLawSettings):
 
         carries = {"robot": RobotGravity, "model": StaticGravity}[self.gravity]
         return RigidImpedanceLaw(robot, self._task(), carries())
+
+    def _kind(self, mass: float) -> float:
+        return EXACT
 
     def gains(self, law: AbstractLaw, model: Numbers, start: Posture) -> Numbers:
         """Return the numbers of the law."""

@@ -7,10 +7,12 @@ from collections.abc import Callable
 from passiflex.problems.problem import Problem
 from passiflex.simulation.book_cautions import book_cautions
 from passiflex.simulation.stability_cautions import stability_cautions
+from passiflex.simulation.start_cautions import singular_start
 from passiflex.simulation.turn_cautions import far_turns, large_moments
 
 CAUTIONS: tuple[Callable[[Problem], tuple[str, ...]], ...] = (
     stability_cautions,
+    singular_start,
     far_turns,
     large_moments,
     book_cautions,
