@@ -146,6 +146,33 @@ def test_a_template_of_xacro_is_expanded_where_its_package_is(
         np.testing.assert_array_equal(FlexibleJointRobot.load(tmp_path / "arm.yaml").torque_limit, [10] * 4)
 
 
+def test_a_template_takes_arguments_and_meshes_of_other_packages_do_not_matter(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    pytest.importorskip("xacrodoc")
+    head = (
+        '<robot name="tree" xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:arg name="most" default="3"/>'
+    )
+    mesh = '<visual><geometry><mesh filename="package://nowhere/a.stl"/></geometry></visual></link>'
+    text = tree(4).replace('<robot name="tree">', head).replace('effort="10"', 'effort="$(arg most)"')
+    assert "</link>" in text
+    (tmp_path / "arm.urdf.xacro").write_text(text.replace("</link>", mesh, 1))
+    (tmp_path / "must.urdf.xacro").write_text(text.replace('<xacro:arg name="most" default="3"/>', ""))
+    monkeypatch.chdir(tmp_path)
+    shell = Shell(monkeypatch, capsys)
+    made = shell("robot", "new", "arm.urdf.xacro", "--xacro", "most=7")
+    assert made.status == 0, made.err
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        np.testing.assert_array_equal(FlexibleJointRobot.load(tmp_path / "arm.yaml").torque_limit, [7] * 4)
+    without = shell("robot", "new", "must.urdf.xacro")
+    assert without.status == 2
+    assert "try --xacro NAME=VALUE for each argument" in " ".join(without.err.split())
+    bad = shell("robot", "new", "must.urdf.xacro", "--xacro", "most")
+    assert bad.status == 2
+    assert "needs NAME=VALUE" in " ".join(bad.err.split())
+
+
 def test_without_the_package_a_template_is_refused_with_how_to_get_it(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:

@@ -24,6 +24,10 @@ def new(
     drive: Annotated[
         str | None, cyclopts.Parameter(help="class of the drives: sensed, industrial, servo, direct")
     ] = None,
+    xacro: Annotated[
+        tuple[str, ...],
+        cyclopts.Parameter(help="an argument of a xacro template, as ur_type=ur5e; once for each"),
+    ] = (),
     out: Annotated[
         Path | None, cyclopts.Parameter(help="file to write; the URDF's name with .yaml if left out")
     ] = None,
@@ -43,7 +47,7 @@ def new(
     if target.exists():
         raise OutputError("the file to write is there already", got=str(target), try_="--out OTHER.yaml")
     require_writable(target.parent)
-    plain = expanded(urdf, target.parent)
+    plain = expanded(urdf, target.parent, _pairs(xacro))
     made = new_robot_file(
         plain, base=base, end_effector=end_effector, drive=drive, folder=target.parent.resolve()
     )
@@ -63,6 +67,15 @@ def new(
         f"hangs on: passiflex card {target} --rate '1 kHz'"
     )
     return 0
+
+
+def _pairs(written: tuple[str, ...]) -> dict[str, str]:
+    from passiflex.errors import ArgumentError
+
+    for pair in written:
+        if "=" not in pair:
+            raise ArgumentError(pair, "NAME=VALUE", "ur_type=ur5e, with no spaces")
+    return dict(pair.split("=", 1) for pair in written)
 
 
 def check(robot: str, /) -> int:

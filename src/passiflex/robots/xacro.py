@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -9,8 +10,13 @@ from passiflex.errors import RobotError
 from passiflex.files import whole_file
 
 
-def expanded(path: Path, folder: Path) -> Path:
+def expanded(path: Path, folder: Path, arguments: Mapping[str, str] | None = None) -> Path:
     """Return the path of a plain URDF: the file itself, or a xacro template's expansion, written into a folder.
+
+    Parameters
+    ----------
+    path, folder: The file, and where to write.
+    arguments: Of the template.
 
     Raises
     ------
@@ -28,10 +34,14 @@ def expanded(path: Path, folder: Path) -> Path:
     from xacrodoc import XacroDoc
 
     try:
-        text = XacroDoc.from_file(str(path), resolve_packages=False).to_urdf_string(use_protocols=False)
+        made = XacroDoc.from_file(str(path), subargs=dict(arguments or {}), resolve_packages=False)
+        text = made.to_urdf_string()
     except Exception as error:  # whatever a template does
         raise RobotError(
-            f"{path} cannot be expanded", got=error, needs="a template without arguments"
+            f"{path} cannot be expanded",
+            got=str(error) or type(error).__name__,
+            needs="all its arguments, and the packages that it finds beside or above it",
+            try_="--xacro NAME=VALUE for each argument",
         ) from error
     name = path.name.removesuffix(".xacro")
     target = folder / (name if name.endswith(".urdf") else f"{name}.urdf")
