@@ -30,7 +30,7 @@ def tip(name: str, q: np.ndarray) -> np.ndarray:
 
 
 def test_names():
-    shipped = "fr3 gen3 iiwa14 iiwa14_stuerz iiwa7 panda planar2r so101 ur10 ur5e xarm7 z1"
+    shipped = "fr3 gen3 iiwa14 iiwa14_stuerz iiwa7 openarm panda planar2r so101 ur10 ur5e xarm7 z1"
     assert catalogue() == tuple(shipped.split())
 
 
@@ -266,6 +266,7 @@ MAKERS = {
     "ur10": ("example-robot-data/robots/ur_description/urdf/ur10_robot.urdf", "tool0"),
     "xarm7": ("example-robot-data/robots/xarm_description/urdf/xarm7.urdf", None),
     "z1": ("example-robot-data/robots/z1_description/urdf/z1.urdf", "gripperStator"),
+    "openarm": ("openarm_description/v10.urdf", "openarm_hand_tcp"),
     "so101": ("example-robot-data/robots/so_arm_description/urdf/so101.urdf", "gripper_frame_link"),
 }
 """Robot → the URDF of its maker, in packages that a machine may have, and its end effector there."""
