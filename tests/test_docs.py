@@ -13,6 +13,7 @@ import pytest
 import yaml
 
 import pages
+import passiflex as pf
 from cli.shell import Shell
 from pages import EXAMPLES, FENCE, PAGES, ROOT, Block, Walk, blocks, furnish, lines, validate
 from passiflex.errors import PassiflexError
@@ -122,7 +123,17 @@ def test_everything_that_is_made_is_shown_and_what_is_shown_is_made(monkeypatch:
     made = {name for group in importlib.import_module("makers").GROUPS for name in group.names}
     figures = found(re.compile(r"\{figure\} generated/(\S+)"))
     reports = found(re.compile(r"reports/(\w+\.html)")) + [f"{name}.html" for name in found(ROLE)]
-    assert made == {*figures, *reports}
+    tables = found(re.compile(r"\{include\} generated/(\S+)"))
+    cards = [
+        f"card_{name}.html" for name in importlib.import_module("makers").CARDS
+    ]  # to which the table links
+    assert made == {*figures, *reports, *tables, *cards}
+
+
+def test_every_arm_of_the_catalogue_has_its_card(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(ROOT / "docs" / "_ext")
+    twice = {"iiwa14_stuerz", "planar2r"}  # an arm with other numbers, and no arm
+    assert {*importlib.import_module("makers").CARDS} == {*pf.catalogue()} - twice
 
 
 def no_viewer(folder: Path) -> None:

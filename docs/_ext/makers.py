@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -11,6 +13,20 @@ if TYPE_CHECKING:
 
 LARGEST = 3_000_000
 """A report that is sent to a colleague has no more bytes than this."""
+CARDS = {
+    "iiwa14": ("1 kHz", "1 ms", "FRI, torque overlay"),
+    "iiwa7": ("1 kHz", "1 ms", "FRI, torque overlay"),
+    "fr3": ("1 kHz", "1 ms", "FCI"),
+    "panda": ("1 kHz", "1 ms", "FCI"),
+    "gen3": ("1 kHz", "1 ms", "low-level API"),
+    "ur5e": ("500 Hz", "2 ms", "RTDE"),
+    "ur10": ("125 Hz", "8 ms", "RTDE of the CB3"),
+    "xarm7": ("250 Hz", "4 ms", "servo mode"),
+    "z1": ("500 Hz", "2 ms", "SDK"),
+    "openarm": ("500 Hz", "2 ms", "CAN bus of its motors"),
+    "so101": ("200 Hz", "5 ms", "serial bus of its servos"),
+}
+"""Robots of the catalogue whose cards are made: rate, delay, and what commands them at that rate."""
 
 
 class Group(NamedTuple):
@@ -84,6 +100,36 @@ def uncertainty(folder: Path) -> None:
     reproduce_uncertainty(folder, samples=64)
 
 
+def cards(folder: Path) -> None:
+    """Make the card of each arm, side by side on all cores, and the table that links to them."""
+    with ProcessPoolExecutor(mp_context=get_context("spawn")) as pool:
+        made = [pool.submit(one_card, name, folder) for name in CARDS]
+        rows = [row.result() for row in made]
+    columns = (
+        "arm",
+        "commanded by",
+        "largest $K_x$, joints as they are",
+        "whatever is assumed",
+        "lowest rate for 1000 N/m",
+    )
+    lines = [columns, ("---",) * len(columns), *rows]
+    (folder / "cards.md").write_text(
+        "\n".join(f"| {' | '.join(line)} |" for line in lines) + "\n", encoding="utf-8"
+    )
+
+
+def one_card(name: str, folder: Path) -> tuple[str, ...]:
+    """Make the card of an arm, and return its row of the table."""
+    import passiflex as pf
+    from passiflex.cards.sheet import summary
+    from passiflex.reports.card_page import write_card
+
+    rate, delay, interface = CARDS[name]
+    card = pf.card(name, rate, delay)
+    write_card(card, folder / f"card_{name}.html")
+    return f"{{report}}`{name} <card_{name}>`", f"{interface}, {rate}", *summary(card)
+
+
 def picture(target: Path, run: Run, baseline: Run | None = None, until: float | None = None) -> None:
     """Draw a run for the gallery; the name of the file ends in the kind of the diagrams.
 
@@ -120,4 +166,5 @@ GROUPS = (
     ),
     Group(("limits.png",), limits),
     Group(("uncertainty.png",), uncertainty),
+    Group(("cards.md", *(f"card_{name}.html" for name in CARDS)), cards),
 )

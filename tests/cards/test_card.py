@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 import re
 import sys
@@ -18,7 +19,8 @@ from passiflex.cards import Card
 from passiflex.cards.border import SCALES, border, damping_window, longest_delay, slowest_clock, stiffness_of
 from passiflex.cards.setting import Setting
 from passiflex.cards.sheet import sheet
-from passiflex.control.task import PositionTask
+from passiflex.cards.spread import BRIDGED, ENTRIES, Spread, assumed, at_shares, range_of
+from passiflex.control.task import PoseTask, PositionTask
 from passiflex.errors import NameUnknownError, PassiflexError
 from passiflex.limits.confirmation import disturbed, growth
 from passiflex.limits.margin_box import Member
@@ -45,6 +47,7 @@ def found() -> Card:
         module = sys.modules[Card.__module__]  # whose name is that of its function
         patch.setattr(module, "TOOLS", (1.0,))
         patch.setattr(module, "STIFFNESSES", (20.0, 200.0))
+        patch.setattr(module, "SLOW", (100.0, 200.0))
         return pf.card("so101", RATE, DELAY)
 
 
@@ -108,21 +111,72 @@ def test_the_slowest_clock_and_the_longest_delay_are_borders() -> None:
 
 
 def test_what_no_search_has_passed_is_not_called_safe(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(Setting, "searched", lambda self, gains: False)
+    assert border(setting(), "translation", thorough=False).stiffness > 10
+    monkeypatch.setattr(Setting, "searched", lambda self, gains, thorough: False)
     assert border(setting(), "translation").stiffness == 0
-    assert border(setting(), "translation", searched=False).stiffness > 10
+    assert math.isnan(damping_window(setting(), "translation", 10.0).least)
+
+
+def test_holds_is_a_radius_below_one() -> None:
+    """Also of an arm whose self-motion drifts, at gains that hold and at others."""
+    arm = FlexibleJointRobot.load("iiwa14")
+    s = Setting(arm, 1000.0, 1e-3, workspace_postures(arm, PoseTask(), 2))
+    rng, said = np.random.default_rng(1), []
+    for _ in range(40):
+        gains = s.gains(
+            10 ** rng.uniform(2, 4.5), 10 ** rng.uniform(1, 3.3), SCALES[rng.integers(len(SCALES))]
+        )
+        period = 10 ** rng.uniform(-4, -2)
+        loop, _ = s.box.loop(s.members[int(rng.integers(len(s.members)))])
+        said.append(loop.holds(period, period, gains))
+        assert said[-1] == (loop.radius(period, period, gains) < 1)
+    assert {*said} == {True, False}
+
+
+def test_what_is_assumed_is_looked_at_over_its_range() -> None:
+    """The same gains for stiffnesses in steps that the margin bridges, with the least damping; and at all corners."""
+    s = setting()
+    spread, K = Spread.over(s), s.robot.joint_stiffness
+    assert assumed(s.robot) == ENTRIES
+    ranges = {entry: range_of(s.robot, entry) for entry in ENTRIES}
+    found = {
+        tuple(round(float((getattr(one.robot, e) / getattr(s.robot, e))[0]), 6) for e in ENTRIES)
+        for one in spread.settings[1:]
+    }
+    for corner in itertools.product(*ranges.values()):
+        assert any(np.allclose(corner, one, rtol=1e-4) for one in found)
+    soft = sorted(one[0] for one in found if one[1:] == tuple(round(ranges[e][0], 6) for e in ENTRIES[1:]))
+    assert max(b / a for a, b in itertools.pairwise(soft)) <= BRIDGED * (1 + 1e-6)
+    assert soft[0] * K[0] == pytest.approx(ranges["joint_stiffness"][0] * K[0])
+    known = dataclasses.replace(s.robot, sources={})
+    assert len(Spread.over(dataclasses.replace(s, robot=known)).settings) == 1
+
+
+def test_gains_over_what_is_assumed_hold_on_robots_drawn_from_it() -> None:
+    narrow = {"joint_stiffness": (0.6, 1.6), "joint_damping": (0.5, 2.0), "motor_inertia": (0.7, 1.5)}
+    s = dataclasses.replace(setting(), robot=dataclasses.replace(setting().robot, ranges=narrow), _members=[])
+    bare, rng = border(s, "translation", thorough=False), np.random.default_rng(11)
+    over = border(Spread.over(s), "translation", thorough=False, most=bare.stiffness)
+    assert 10 < over.stiffness < bare.stiffness
+    for _ in range(12):
+        other = at_shares(s, {e: math.exp(rng.uniform(*np.log(range_of(s.robot, e)))) for e in ENTRIES})
+        gains = other.gains(*stiffness_of("translation", over.stiffness / 2))
+        gains["damping"] = np.eye(3) * math.exp(rng.uniform(*np.log(over.damping[:2])))
+        for _ in range(6):
+            assert other.radius(random_member(other, rng), gains) < 1
 
 
 def test_a_card_says_it_all_on_one_page() -> None:
     card = found()
     titles = [block.title for block in sheet(card)]
-    assert titles[:3] == ["Answer", "Largest safe K_x", "Lowest rate and longest delay"]
+    assert titles[:4] == ["Answer", "Largest safe K_x", "At other rates", "Lowest rate and longest delay"]
     text = card_text(card)
     for said in (
         "so101 at 100 Hz with 1 period of delay",
         "K_x up to ",
         "None: the arm measures no joint torque.",
-        "Assumed, not measured: joint_stiffness, joint_damping, motor_inertia",
+        "Assumed, not measured: joint_stiffness 0.2 to 5 times, joint_damping",
+        "No gain holds for all that they may be in these ranges",
         "2 √K_x",
         "passiflex card so101 --rate '100 Hz' --delay '10 ms'",
     ):
@@ -130,7 +184,10 @@ def test_a_card_says_it_all_on_one_page() -> None:
     assert max(map(len, text.splitlines())) <= 140
     assert text.count("\n") < 70
     assert card.shaping is None
-    assert [row.tool for row in card.rows] == [0.0, 1.0]
+    assert [(row.tool, row.over) for row in card.rows] == [(0.0, False), (0.0, True), (1.0, False)]
+    assert [at.rate for at in card.slow] == [100.0, 200.0]
+    assert card.slow[0].border is card.bare.border
+    assert card.slow[0].border.stiffness < card.slow[1].border.stiffness
     assert card.clocks[0].rate < card.clocks[1].rate
     assert {hang.entry for hang in card.hangs} == {"joint_stiffness", "joint_damping", "motor_inertia"}
     assert any(told.growth >= 1 for told in card.folklore)  # 5000 N/m on an arm of servos

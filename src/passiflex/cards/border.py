@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from passiflex.cards.setting import ROTATION, TRANSLATION, Scales, Setting
+from passiflex.cards.spread import Spread
 from passiflex.stability.modes import Spectrum
 
 Array = NDArray[np.float64]
+Gains = Mapping[str, Array]
 
 STIFFEST = {"translation": 30_000.0, "rotation": 3_000.0}
 """[N/m], [N m/rad] Nothing stiffer is looked for: the springs of the joints are softer."""
 BEGUN = {
-    "translation": (1000.0, 300.0, 3000.0, 100.0, 10_000.0, 30.0),
+    "translation": (1000.0, 300.0, 3000.0, 100.0, 10_000.0, 30.0, 10.0),
     "rotation": (30.0, 100.0, 10.0, 300.0, 3.0, 1.0),
 }
 """K_x from which on the largest one is looked for: the first that holds [N/m], [N m/rad]."""
@@ -26,10 +29,12 @@ SCALES: tuple[Scales, ...] = (
     (4.0, 1.0), (2.0, 2.0), (1.0, 2.0),
 )  # fmt: skip
 """Multiples of the designed damping that are tried, of translation and rotation, the likeliest first."""
-WIDEST = 64.0
+WIDEST = 16.0
 """How many times the damping is raised or lowered at most."""
 STEP = 1.15
 """Ratio of two values that are tried: beyond what does not hold something may hold again, as a low rate does."""
+WIDE, INSIDE = 1.3, 1.15
+"""The same ratio of damping, and how far a window of it stays inside of its ends."""
 FINE = 1.04
 """Ratio to which a border is found."""
 LOWERED = 0.8
@@ -38,8 +43,8 @@ BEYOND = 1.1
 """By which K_x is raised until something does not hold, to see what that is."""
 MOST_BEYOND = 40
 SEARCHES = 10
-SLOWEST, FASTEST = 20.0, 20_000.0
-"""[Hz] Between which the lowest rate is looked for."""
+SLOWEST, FASTEST, FASTER = 20.0, 20_000.0, 4.0
+"""[Hz] Between which the lowest rate is looked for; and from how many times its own rate on."""
 LATEST = 40
 """Periods of delay at most."""
 
@@ -50,6 +55,9 @@ class Window(NamedTuple):
     least: float
     most: float
     beside: float
+
+
+NO_WINDOW = Window(math.nan, math.nan, math.nan)
 
 
 class Border(NamedTuple):
@@ -87,63 +95,86 @@ def stiffness_of(part: str, value: float) -> tuple[float, float]:
     return (value, ROTATION) if part == "translation" else (TRANSLATION, value)
 
 
-def border(setting: Setting, part: str, *, searched: bool = True) -> Border:
+def border(setting: Setting | Spread, part: str, *, thorough: bool = True, most: float = math.inf) -> Border:
     """Return the largest K_x that some damping holds with, the rest of the gains as usual, over the whole box.
 
-    Without a search it is the members that are known that decide.
+    Parameters
+    ----------
+    setting, part: Of what.
+    thorough: Whether the box is searched at every posture.
+    most: Nothing stiffer is looked for.
     """
+    scales = list(SCALES)
 
     def scale_for(k: float) -> Scales | None:
         pair = stiffness_of(part, k)
-        return next((s for s in SCALES if setting.holds(setting.gains(*pair, s))), None)
+        found = next((s for s in scales if setting.holds(setting.gains(*pair, s))), None)
+        if found is not None:
+            scales.insert(0, scales.pop(scales.index(found)))  # what has just held is asked first
+        return found
 
     begun = next((k for k in BEGUN[part] if scale_for(k) is not None), 0.0)
-    most = _largest(lambda k: scale_for(k) is not None, begun, STIFFEST[part]) if begun else 0.0
-    for _ in range(SEARCHES if most and searched else 0):
-        scale = scale_for(most)
-        if scale is not None and setting.searched(setting.gains(*stiffness_of(part, most), scale)):
+    cap = min(most, STIFFEST[part])
+    k = _largest(lambda k: scale_for(k) is not None, min(begun, cap), cap) if begun else 0.0
+    for _ in range(SEARCHES if k else 0):
+        scale = scale_for(k)
+        gains = setting.gains(*stiffness_of(part, k), scale or SCALES[0])
+        if scale is not None and setting.searched(gains, thorough=thorough):
             break
-        most *= LOWERED
+        k *= LOWERED
     else:
-        most = most if not searched else 0.0  # what no search has passed is not called safe
-    if not most:
-        return Border(
-            part, 0.0, Window(math.nan, math.nan, math.nan), *_failing(setting, part, BEGUN[part][0])
-        )
-    window = damping_window(setting, part, most / 2)
-    if most >= STIFFEST[part]:
-        return Border(part, math.inf, window, None, "", setting.postures[0])
-    return Border(part, most, window, *_failing(setting, part, most))
+        k = 0.0  # what no search has passed is not called safe
+    if not k:
+        return Border(part, 0.0, NO_WINDOW, *_failing(setting, part, BEGUN[part][-1], SCALES[0]))
+    window = damping_window(setting, part, k / 2)
+    if k >= STIFFEST[part]:
+        return Border(part, math.inf, window, None, "", setting.worst(gains).angles)
+    return Border(part, k, window, *_failing(setting, part, k, scales[0]))
 
 
-def damping_window(setting: Setting, part: str, k: float) -> Window:
-    """Return the least and the largest D_x that holds at a K_x."""
+def damping_window(setting: Setting | Spread, part: str, k: float) -> Window:
+    """Return the least and the largest D_x that holds at a K_x, a little inside of what a search has passed."""
     pair, row = stiffness_of(part, k), 0 if part == "translation" else -1
-    inside = next((s for s in SCALES if setting.holds(setting.gains(*pair, s))), None)
-    if inside is None:
-        return Window(math.nan, math.nan, math.nan)
-    push, turn = inside
 
-    def holds(share: float) -> bool:
-        scales = (share * push, turn) if part == "translation" else (push, share * turn)
-        return setting.holds(setting.gains(*pair, scales))
+    def gains(scales: Scales, share: float) -> Gains:
+        push, turn = scales
+        return setting.gains(*pair, (share * push, turn) if part == "translation" else (push, share * turn))
 
-    low = 1 / _largest(lambda share: holds(1 / share), 1.0, WIDEST)
-    high = _largest(holds, 1.0, WIDEST)
-    found = np.diag(setting.gains(*pair, inside)["damping"])
-    return Window(low * found[row], high * found[row], float(found[-1 - row]))
+    for scales in SCALES:
+        if not setting.holds(gains(scales, 1.0)):
+            continue
+        up = _searched_end(setting, partial(gains, scales))
+        down = _searched_end(setting, lambda share, s=scales: gains(s, 1 / share))  # type: ignore[misc]
+        if up and down:
+            found = np.diag(gains(scales, 1.0)["damping"])
+            return Window(found[row] / down, found[row] * up, float(found[-1 - row]))
+    return NO_WINDOW
+
+
+def _searched_end(setting: Setting | Spread, gains: Callable[[float], Gains]) -> float:
+    """Return how far damping may go from 1, a little inside of what a search has passed; 0 if not at all."""
+    end = _largest(lambda share: setting.holds(gains(share)), 1.0, WIDEST, WIDE)
+    while end >= INSIDE:
+        if setting.holds(gains(end)) and setting.searched(gains(end), thorough=False):
+            return end / INSIDE
+        end /= WIDE
+    return 0.0
 
 
 def slowest_clock(setting: Setting, k: float) -> float:
-    """Return the lowest rate [Hz] at which a translational K_x holds, with the delay in periods that it has; or inf."""
+    """Return the lowest rate [Hz] at which a translational K_x holds, with the delay in periods that it has; or inf.
+
+    It holds at all rates that were tried from there up to `FASTER` times its own, or to `FASTEST` if not at that.
+    """
     periods = setting.delay * setting.rate
 
     def holds(rate: float) -> bool:
         return any(setting.holds(setting.gains(k, ROTATION, s), 1 / rate, periods / rate) for s in SCALES)
 
-    if not holds(FASTEST):
+    top = next((rate for rate in (FASTER * setting.rate, FASTEST) if holds(rate)), math.inf)
+    if math.isinf(top):
         return math.inf
-    return FASTEST / _largest(lambda slower: holds(FASTEST / slower), 1.0, FASTEST / SLOWEST)
+    return top / _largest(lambda slower: holds(top / slower), 1.0, top / SLOWEST)
 
 
 def longest_delay(setting: Setting, k: float) -> float:
@@ -164,30 +195,24 @@ def longest_delay(setting: Setting, k: float) -> float:
     return low
 
 
-def _failing(setting: Setting, part: str, k: float) -> tuple[Spectrum, str, Array]:
-    """Return what does not die out beyond a K_x with the damping that bears most, in which joint, and where."""
+def _failing(setting: Setting | Spread, part: str, k: float, scale: Scales) -> tuple[Spectrum, str, Array]:
+    """Return what does not die out beyond a K_x with a damping, in which joint, and where."""
     for _ in range(MOST_BEYOND):
         k *= BEYOND
-        pair, found = stiffness_of(part, k), []
-        for scale in SCALES:
-            gains = setting.gains(*pair, scale)
-            worst = max(setting.members, key=lambda m: setting.radius(m, gains))
-            found.append((setting.radius(worst, gains), scale, worst))
-        radius, scale, member = min(found, key=lambda entry: entry[0])
-        if radius >= 1:
+        gains = setting.gains(*stiffness_of(part, k), scale)
+        if not setting.holds(gains):
             break
-    loop, late = setting.box.loop(member)
-    mode = loop.spectrum(1 / setting.rate, late, setting.gains(*pair, scale))
-    name = setting.robot.arm.chain.joints[mode.joint - 1].name
-    return mode, name, setting.box.angles(member)
+    found = setting.worst(gains)
+    mode = found.mode(gains)
+    return mode, found.setting.robot.arm.chain.joints[mode.joint - 1].name, found.angles
 
 
-def _largest(holds: Callable[[float], bool], low: float, high: float) -> float:
+def _largest(holds: Callable[[float], bool], low: float, high: float, step: float = STEP) -> float:
     """Return the largest value up to `high` that holds, walking up from `low`; 0 if that does not."""
     if not holds(low):
         return 0.0
     while low < high:
-        beyond = min(low * STEP, high)
+        beyond = min(low * step, high)
         if not holds(beyond):
             break
         low = beyond

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 import shlex
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -14,19 +13,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from passiflex.cards.border import SCALES, Border, border, longest_delay, slowest_clock
+from passiflex.cards.folklore import USUAL, Told, folklore
 from passiflex.cards.setting import MARGIN, ROTATION, Setting
-from passiflex.control.motion import hold, moved
+from passiflex.cards.spread import ENTRIES, Spread, assumed, at_shares, range_of
 from passiflex.control.task import PoseTask, PositionTask
 from passiflex.errors import PassiflexError
 from passiflex.limits import Recommendation, recommend
-from passiflex.limits.confirmation import disturbed, growth
 from passiflex.limits.one_thread import on_one_thread
 from passiflex.limits.subject import DELAY, RATE, number
 from passiflex.limits.workspace import workspace_postures
-from passiflex.problems.altered import altered
-from passiflex.problems.problem import Event
 from passiflex.robots.flexible import FlexibleJointRobot
-from passiflex.simulation.simulate_sampled import simulate_unchecked
 
 Array = NDArray[np.float64]
 Report = Callable[[str], None]
@@ -35,14 +31,10 @@ TOOLS = (0.5, 1.0, 2.0)
 """[kg] Masses on the flange beside none."""
 STIFFNESSES = (200.0, 500.0, 1000.0, 3000.0)
 """[N/m] For which the slowest clock and the longest delay are looked for."""
-USUAL = 1000.0
-"""[N/m] For which the joints are shaped, and at which it is seen what the answer hangs on."""
-FOLKLORE = 5000.0
-"""[N/m] What people call a typical largest stiffness."""
+SLOW = (100.0, 125.0, 200.0, 500.0)
+"""[Hz] Rates at which arms without torque sensors are commanded."""
 RAISED, MOST_RAISED = 1.15, 16.0
 """By which B_e of all joints is raised for the tools, and most."""
-STEP, LASTS = 0.01, 1.0
-"""[m], [s] A step of the reference in the simulations."""
 NOISE = 0.2
 """[(N m)²] Variance of the torque sensors' noise."""
 LEAST_POSE = 6
@@ -50,10 +42,18 @@ LEAST_POSE = 6
 
 
 class Row(NamedTuple):
-    """One way to run the arm, with its border."""
+    """One way to run the arm, with its border; over a spread it holds for all that is assumed of the arm."""
 
     tool: float
     shaped: bool
+    border: Border
+    over: bool = False
+
+
+class Slow(NamedTuple):
+    """A rate [Hz] that other interfaces have, with the border of translation at it."""
+
+    rate: float
     border: Border
 
 
@@ -74,23 +74,6 @@ class Hang(NamedTuple):
     assumed: bool
 
 
-class Told(NamedTuple):
-    """A piece of folklore, and what would happen.
-
-    Attributes
-    ----------
-    said: The gains.
-    frequency: Of the slowest mode to die out [Hz].
-    growth: Of a push in the nonlinear simulation: it dies out if below 1.
-    overshoot: Of a step of the reference in it, as a share of the step; nan if it left the finite numbers.
-    """
-
-    said: str
-    frequency: float
-    growth: float
-    overshoot: float
-
-
 @dataclass(frozen=True, eq=False)
 class Card:
     """What is safe for an arm at a rate.
@@ -101,6 +84,7 @@ class Card:
     sensed: Whether the arm has torque sensors, so that joints can be shaped.
     postures: (p, n) rad.
     rows: Largest K_x and its damping, by tool and shaping.
+    slow: The same at the rates of other interfaces, for an arm without torque sensors.
     clocks: Without shaping, bare flange.
     shaping: What was found of B_e on the bare flange; None where the arm cannot shape.
     why_not: Why there is no shaping; empty if there is.
@@ -117,6 +101,7 @@ class Card:
     sensed: bool
     postures: Array
     rows: tuple[Row, ...]
+    slow: tuple[Slow, ...]
     clocks: tuple[Clock, ...]
     shaping: Recommendation | None
     why_not: str
@@ -129,6 +114,11 @@ class Card:
     def bare(self) -> Row:
         """Return the border of translation without tool and shaping."""
         return self.rows[0]
+
+    @property
+    def surest(self) -> Row:
+        """Return the same over all that is assumed of the arm, where something is."""
+        return next((row for row in self.rows if row.over), self.bare)
 
 
 @on_one_thread
@@ -162,7 +152,7 @@ def card(
     report(f"{arm.name}: compiling")
     places = workspace_postures(arm, PoseTask() if task == "pose" else PositionTask())
     own = Setting(arm, hertz, late, places, task)
-    rows = [*_rows(own, shaped=False, report=report)]
+    rows = _rows(own, shaped=False, report=report)
     shaping, why = (None, "the arm measures no joint torque") if not told else _shaping(own, report)
     shaped = None if shaping is None else _shaped(own, shaping)
     if shaped is None:
@@ -172,7 +162,7 @@ def card(
     report(f"{arm.name}: clocks")
     clocks = tuple(Clock(k, slowest_clock(own, k), longest_delay(own, k)) for k in STIFFNESSES)
     report(f"{arm.name}: what it hangs on")
-    hangs = tuple(_hang(own, entry) for entry in ("joint_stiffness", "joint_damping", "motor_inertia"))
+    hangs = tuple(_hang(own, entry) for entry in ENTRIES)
     report(f"{arm.name}: folklore")
     command = f"passiflex card {shlex.quote(str(named))} --rate '{hertz:g} Hz' --delay '{1e3 * late:g} ms'"
     return Card(
@@ -183,12 +173,13 @@ def card(
         sensed=told,
         postures=places,
         rows=tuple(rows),
+        slow=() if told else tuple(_slow(own, rows[0].border, report)),
         clocks=clocks,
         shaping=shaping,
         why_not=why,
         inertia=None if shaped is None else shaped.inertia,
         hangs=hangs,
-        folklore=tuple(_folklore(own)),
+        folklore=tuple(folklore(own)),
         command=command,
     )
 
@@ -200,11 +191,29 @@ def _rows(setting: Setting, *, shaped: bool, report: Report) -> list[Row]:
     for part in parts:
         report(f"{setting.robot.name}: largest K_x of {part}, {way}")
         out.append(Row(0.0, shaped, border(setting, part)))
+    spread, bare = Spread.over(setting), out[0].border
+    if len(spread.settings) > 1 and not shaped:
+        report(f"{setting.robot.name}: largest K_x over what is assumed")
+        over = border(spread, bare.part, thorough=False, most=bare.stiffness) if bare.stiffness else bare
+        out.append(Row(0.0, shaped, over, over=True))
     for mass in TOOLS:
         report(f"{setting.robot.name}: largest K_x with {mass:g} kg, {way}")
         carrying = dataclasses.replace(setting, tool=mass, _members=list(setting.members))
-        out.append(Row(mass, shaped, border(carrying, "translation", searched=False)))
+        out.append(Row(mass, shaped, border(carrying, "translation", thorough=False)))
     return out
+
+
+def _slow(own: Setting, bare: Border, report: Report) -> Iterator[Slow]:
+    """Yield the border of translation at the rates of other interfaces, with the delay in periods that the arm has."""
+    for rate in SLOW:
+        if rate == own.rate:
+            yield Slow(rate, bare)
+            continue
+        report(f"{own.robot.name}: largest K_x at {rate:g} Hz")
+        other = dataclasses.replace(
+            own, rate=rate, delay=own.delay * own.rate / rate, _members=list(own.members)
+        )
+        yield Slow(rate, border(other, "translation", thorough=False))
 
 
 def _shaping(own: Setting, report: Report) -> tuple[Recommendation | None, str]:
@@ -238,36 +247,7 @@ def _shaped(own: Setting, found: Recommendation) -> Setting | None:
 
 def _hang(own: Setting, entry: str) -> Hang:
     """Return the lowest rate for a usual K_x at both ends of an entry's range, as multiples of that without it."""
-    low, high = own.robot.ranges.get(entry, (0.5, 2.0))
-    middle, ends = slowest_clock(own, USUAL), []
-    for share in (low, high):
-        other = dataclasses.replace(own.robot, **{entry: share * getattr(own.robot, entry)})
-        ends.append(slowest_clock(dataclasses.replace(own, robot=other, _members=[]), USUAL) / middle)
-    return Hang(entry, (low, high), (ends[0], ends[1]), "assumed" in own.robot.sources.get(entry, ""))
-
-
-def _folklore(own: Setting) -> Iterator[Told]:
-    """Yield what becomes of what people say: stiffnesses, and a damping of 2 √K whatever the inertia; simulated."""
-    size = 6 if own.task == "pose" else 3
-    for k in (USUAL, FOLKLORE):
-        K = np.array([k] * 3 + [k / 10] * 3)[:size]
-        careless = {"stiffness": np.diag(K), "damping": np.diag(2 * np.sqrt(K))}
-        yield _simulated(own, f"K_x = {k:g} N/m with D_x = 2 √K_x, whatever the inertia", careless)
-        yield _simulated(own, f"K_x = {k:g} N/m, damped by the inertia that moves", own.gains(k, k / 10))
-
-
-def _simulated(own: Setting, said: str, gains: Mapping[str, Array]) -> Told:
-    """Return what the nonlinear loop does after a step, at the posture and on the robot that like it least."""
-    worst = max(own.members, key=lambda m: own.radius(m, gains))
-    loop, late = own.box.loop(worst)
-    mode = loop.spectrum(1 / own.rate, late, gains)
-    changed = altered(own.box.problems[worst.posture], gains=gains, plant=own.box.plant(worst))
-    quiet = dataclasses.replace(disturbed(changed), delay=late)
-    grown = growth(quiet)
-    goal = moved(changed.home, (0.0, 0.0, STEP), (0.0, 0.0, 0.0))
-    stepped = dataclasses.replace(
-        quiet, events=(Event(0.0, hold(goal), np.zeros(6)),), duration=round(LASTS * own.rate) / own.rate
-    )
-    run = simulate_unchecked(stepped)
-    way = (run["position"][:, 2] - run["position"][0, 2]) / STEP
-    return Told(said, mode.frequency, grown, math.nan if run.failure else float(way.max() - 1))
+    low, high = range_of(own.robot, entry)
+    middle = slowest_clock(own, USUAL)
+    ends = [slowest_clock(at_shares(own, {entry: share}), USUAL) / middle for share in (low, high)]
+    return Hang(entry, (low, high), (ends[0], ends[1]), entry in assumed(own.robot))

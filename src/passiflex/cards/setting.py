@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import yaml
@@ -17,6 +17,7 @@ from passiflex.problems.problem import SampledProblem, require_sampled
 from passiflex.robots.flexible import FlexibleJointRobot
 from passiflex.scenarios.scenario_file import parse_scenario
 from passiflex.simulation import resolve
+from passiflex.stability.modes import Spectrum
 
 Array = NDArray[np.float64]
 
@@ -29,8 +30,28 @@ RATIO = 0.7
 """Damping ratio of a design, by the inertia that moves."""
 ROTATION, TRANSLATION = 30.0, 500.0
 """K_x of the part that is not looked at [N m/rad], [N/m]."""
+NEAREST = 2
+"""Postures at which the box is searched where that is not done at all of them."""
 TOOL_CENTRE, TOOL_RADIUS = 0.08, 0.04
 """[m] Where the centre of a tool of some mass is above the flange, and its radius of gyration."""
+
+
+class Found(NamedTuple):
+    """Which robot of which setting dies out last, and its spectral radius per period."""
+
+    radius: float
+    setting: Setting
+    member: Member
+
+    @property
+    def angles(self) -> Array:
+        """Return its posture (n,) rad."""
+        return self.setting.box.angles(self.member)
+
+    def mode(self, gains: Mapping[str, Array]) -> Spectrum:
+        """Return what dies out last."""
+        loop, late = self.setting.box.loop(self.member)
+        return loop.spectrum(1 / self.setting.rate, late, gains)
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,21 +172,36 @@ class Setting:
             if delay is not None or period is not None:
                 own = self.delay if delay is None else delay
                 late = max(own + (late - self.delay) * T * self.rate, 0.0)
-            if not loop.radius(T, late, gains) < 1:
+            if not loop.holds(T, late, gains):
                 self.members.insert(0, self.members.pop(i))
                 return False
         return True
+
+    def worst(self, gains: Mapping[str, Array]) -> Found:
+        """Return which of the robots that are known dies out last with these gains."""
+        return max(
+            (Found(self.radius(m, gains), self, m) for m in self.members), key=lambda found: found.radius
+        )
 
     def radius(self, member: Member, gains: Mapping[str, Array]) -> float:
         """Return the spectral radius per period of a robot with these gains."""
         loop, late = self.box.loop(member)
         return loop.radius(1 / self.rate, late, gains)
 
-    def searched(self, gains: Mapping[str, Array]) -> bool:
-        """Return whether nothing that fails is found in the box at any posture; what is found is asked from then on."""
-        for place in range(len(self.postures)):
+    def searched(self, gains: Mapping[str, Array], *, thorough: bool = True) -> bool:
+        """Return whether nothing that fails is found in the box; what is found is asked from then on.
+
+        Thorough: at every posture; else at those two where the robots that are known die out last.
+        """
+        for place in range(len(self.postures)) if thorough else self._nearest(gains):
             worst = self.box.search(gains, place, thorough=False)
             if not worst.stable:
                 self.members.insert(0, worst.member)
                 return False
         return True
+
+    def _nearest(self, gains: Mapping[str, Array]) -> list[int]:
+        last = dict.fromkeys(range(len(self.postures)), 0.0)
+        for member in self.members:
+            last[member.posture] = max(last[member.posture], self.radius(member, gains))
+        return sorted(last, key=lambda place: -last[place])[:NEAREST]

@@ -9,8 +9,10 @@ from typing import NamedTuple
 import numpy as np
 
 from passiflex.cards.border import STIFFEST
-from passiflex.cards.card import FOLKLORE, NOISE, USUAL, Card, Row, Told
-from passiflex.cards.setting import MARGIN, RATIO, ROTATION, TOOL_CENTRE, TRANSLATION
+from passiflex.cards.card import NOISE, Card, Row
+from passiflex.cards.folklore import FOLKLORE, USUAL, Told
+from passiflex.cards.setting import MARGIN, NEAREST, RATIO, ROTATION, TOOL_CENTRE, TRANSLATION
+from passiflex.cards.spread import assumed, range_of
 from passiflex.control.posture import posture
 from passiflex.limits.margin_box import NEAR
 from passiflex.origin import package_version
@@ -43,6 +45,7 @@ def sheet(card: Card) -> list[Block]:
     return [
         _answer(card),
         _stiffness(card),
+        *([_slow(card)] if card.slow else []),
         _clocks(card),
         _shaping(card),
         _hangs(card),
@@ -68,10 +71,24 @@ def _answer(card: Card) -> Block:
     lines.append(
         f"Joint springs alone give way as {_compliance(card):.3g} N/m does: nothing at its end effector is stiffer."
     )
-    assumed = [entry for entry, source in robot.sources.items() if "assumed" in source]
-    if assumed:
-        lines.append(f"Assumed, not measured: {', '.join(assumed)}.")
+    if card.surest.over:
+        ends = [(entry, range_of(robot, entry)) for entry in assumed(robot)]
+        words = ", ".join(f"{entry} {low:.2g} to {high:.2g} times" for entry, (low, high) in ends)
+        borne = card.surest.border.stiffness
+        surest = (
+            f"Whatever they are in these ranges, it bears {_stiff(borne, 'translation')}."
+            if borne
+            else "No gain holds for all that they may be in these ranges: measure them before you trust the first line."
+        )
+        lines.append(f"Assumed, not measured: {words}. {surest}")
     return Block("Answer", tuple(lines))
+
+
+def summary(card: Card) -> tuple[str, str, str]:
+    """Return its answer in three cells: the largest K_x of translation, that over what is assumed, the lowest rate."""
+    surest = _stiff(card.surest.border.stiffness, "translation") if card.surest.over else "nothing is"
+    usual = next(clock for clock in card.clocks if clock.stiffness == USUAL)
+    return _stiff(card.bare.border.stiffness, "translation"), surest, _rate(usual.rate)
 
 
 def _compliance(card: Card) -> float:
@@ -97,7 +114,8 @@ def _row(row: Row, *, turning: bool) -> tuple[str, ...]:
     if turning and not math.isnan(low):
         window += f", {beside:.2g} {UNITS[OTHER[b.part]][1]} beside"
     tool = f"{row.tool:g} kg" if row.tool else "none"
-    return tool, "shaped" if row.shaped else "as they are", b.part, _stiff(b.stiffness, b.part), window, b.why
+    joints = "shaped" if row.shaped else "anywhere in range" if row.over else "as they are"
+    return tool, joints, b.part, _stiff(b.stiffness, b.part), window, b.why
 
 
 def _stiff(value: float, part: str) -> str:
@@ -111,11 +129,23 @@ def _stiff(value: float, part: str) -> str:
     return f"up to {math.floor(value / size) * size:g} {unit}"
 
 
+def _slow(card: Card) -> Block:
+    rows = tuple(
+        (hertz(at.rate), *_row(Row(0.0, False, at.border), turning=card.task == "pose")[3:])
+        for at in card.slow
+    )
+    return Block(
+        "At other rates",
+        (f"Translation, joints as they are, no tool, {delay_words(card.delay * card.rate)}.",),
+        Table(("rate", "largest K_x", "D_x at half of it", "limit"), rows),
+    )
+
+
 def _clocks(card: Card) -> Block:
     rows = tuple(
         (
             f"{c.stiffness:g} N/m",
-            "none" if math.isinf(c.rate) else f"{math.ceil(c.rate):d} Hz",
+            _rate(c.rate),
             "none" if math.isnan(c.delay) else f"{math.floor(1e4 * c.delay) / 10:g} ms",
         )
         for c in card.clocks
@@ -126,6 +156,10 @@ def _clocks(card: Card) -> Block:
         ("Joints as they are, no tool.",),
         Table(("K_x", f"lowest rate, {periods}", f"longest delay at {hertz(card.rate)}"), rows),
     )
+
+
+def _rate(rate: float) -> str:
+    return "none" if math.isinf(rate) else f"{math.ceil(rate):d} Hz"
 
 
 def _shaping(card: Card) -> Block:
@@ -194,8 +228,8 @@ def _how(card: Card, task: str) -> Iterator[str]:
     yield (
         f"Safe: the sampled loop is stable at {len(card.postures)} postures over the workspace on every robot that was "
         f"tried of a box: B, K, D and the links' inertia of each joint off by {100 * MARGIN:g} %, the delay by "
-        f"{MARGIN:g} periods, corners and a search uphill (with tools, the robots that decided without), joints up "
-        f"to {NEAR:g} rad beside."
+        f"{MARGIN:g} periods, corners and a search uphill (with tools, in range, at other rates: at the {NEAREST} "
+        f"postures nearest to the limit), joints up to {NEAR:g} rad beside."
     )
     yield (
         f"Task: {task}. Velocities are differences of readings. The other part of K_x is {ROTATION:g} N m/rad or "

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,6 +13,7 @@ from passiflex.control.motion import Pose
 from passiflex.control.posture import Posture, posture
 from passiflex.loops.sampled_loop import SampledLoop
 from passiflex.problems.problem import SampledProblem
+from passiflex.robots.flexible import FlexibleJointRobot
 from passiflex.sampled.rest import Rest
 
 Array = NDArray[np.float64]
@@ -73,7 +75,7 @@ def loop_at_rest(
     p, at = problem, at or standing(problem)
     model = p.law.robot.layout.unpack(p.model)
     shaped = p.law.posture_at_rest(at.q, at.theta, model["joint_stiffness"], gains)
-    home = posture(p.law.robot, shaped, model).pose
+    home = _seen(p.law.robot, shaped.tobytes(), p.model.tobytes()).pose
     rest = at_rest(p, at, home, gains["stiffness"], BRIMFUL, running=1.0)
     row: dict[str, Any] = {
         "desired_position": home.position,
@@ -91,12 +93,13 @@ def at_rest(
     """Return what the parts of a loop are told of where it rests: its reference at `home`, its tank at a level [J]."""
     robot = problem.law.robot
     model, plant = robot.layout.unpack(problem.model), robot.layout.unpack(at.plant)
+    seen = _seen(robot, at.q.tobytes(), problem.model.tobytes())
     return Rest(
         running=running,
         q=at.q,
         theta=at.theta,
         tau_a=plant["joint_stiffness"] * (at.theta - at.q),
-        weight=posture(robot, at.q, model).gravity_torque,
+        weight=seen.gravity_torque,
         command=at.held,
         stiffness=model["joint_stiffness"],
         position=home.position,
@@ -104,3 +107,9 @@ def at_rest(
         cartesian_stiffness=np.asarray(stiffness),
         level=level,
     )
+
+
+@lru_cache(maxsize=256)
+def _seen(robot: FlexibleJointRobot, q: bytes, model: bytes) -> Posture:
+    """Return the arm at q as a law sees it: asked again and again for gains that change nothing there."""
+    return posture(robot, np.frombuffer(q), robot.layout.unpack(np.frombuffer(model)))

@@ -84,6 +84,17 @@ class Modes:
         return float(np.abs(lasting(matrix, period, task_jacobian)).max(initial=0.0))
 
     @staticmethod
+    def stable_of(matrix: Array, period: float, task_jacobian: Array) -> bool:
+        """Return whether `radius_of` is below 1; drift is looked for only where nothing else has decided."""
+        kept, alone = coupled(matrix)
+        tight = matrix[np.ix_(kept, kept)]
+        values = np.linalg.eigvals(tight)
+        out = values[~(np.abs(values) < 1)]
+        if (~(np.abs(alone) < 1)).any() or (~_slow(out, period)).any():
+            return False
+        return bool(drift_of(tight, out, period, task_jacobian).all())
+
+    @staticmethod
     def trembling_of(matrix: Array, period: float, task_jacobian: Array, settling: float) -> float:
         """Return the largest |eigenvalue| of what trembles, or of a slower motion that does not die out.
 
@@ -174,8 +185,9 @@ def _slow(values: NDArray[Any], period: float) -> Flags:
 
 def _vector(matrix: Array, value: complex) -> NDArray[Any]:
     """Return an eigenvector of this eigenvalue by inverse iteration."""
-    shifted = scipy.linalg.lu_factor(matrix - (value + 1j * SHIFT) * np.eye(len(matrix)), check_finite=False)
-    vector = np.ones(len(matrix), dtype=complex)
+    near = value + 1j * SHIFT if value.imag else value.real + SHIFT
+    shifted = scipy.linalg.lu_factor(matrix - near * np.eye(len(matrix)), check_finite=False)
+    vector = np.ones(len(matrix), dtype=np.result_type(near))
     for _ in range(3):
         vector = scipy.linalg.lu_solve(shifted, vector, check_finite=False)
         vector /= np.linalg.norm(vector)
