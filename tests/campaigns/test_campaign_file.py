@@ -2,14 +2,18 @@
 
 # ruff: noqa: E501 - one pinned message per line
 
+import itertools
 from importlib import resources
 
 import pytest
 
 from passiflex.campaigns import Campaign, load_campaign, parse_campaign, require_possible
 from passiflex.campaigns.distributions import Choice, LogUniform, Normal, Uniform
+from passiflex.campaigns.ends import at_medians
+from passiflex.campaigns.target import PathRefusedError, complete_data, locate
 from passiflex.errors import ScenarioError
-from passiflex.simulation import load_scenario
+from passiflex.simulation import Scenario, load_scenario
+from passiflex.texts.model_mistakes import fields, models
 
 SCENARIOS = resources.files("passiflex") / "studies" / "scenarios"
 FIG1 = load_scenario(str(SCENARIOS / "fig1_sampled.yaml"))
@@ -132,6 +136,40 @@ def test_parameters_may_make_a_section_together():
     text = INLINE + "  control.rate: {distribution: choice, values: [1 kHz, 2 kHz]}\n"
     text += "  control.jitter: {distribution: uniform, low: 0, high: 0.1 ms}\n"
     assert set(parse_campaign(text).parameters) == {"noise.torque_variance", "control.rate", "control.jitter"}
+
+
+def test_what_an_arm_picks_up_is_uncertain_also_where_the_scenario_has_nothing():
+    text = INLINE + "  payload.mass: {distribution: uniform, low: 0.5, high: 1.5}\n"
+    text += "  payload.centre.3: {distribution: uniform, low: 2 cm, high: 10 cm}\n"
+    c = parse_campaign(text)
+    assert c.scenario.payload is None
+    data = complete_data(c.scenario)
+    payload = at_medians(c.parameters, {path: locate(data, path) for path in c.parameters}, data)["payload"]
+    assert payload == {"mass": pytest.approx(1.0), "centre": [0.0, 0.0, pytest.approx(0.06)]}
+
+
+def test_every_place_that_is_found_can_be_written():
+    """Of each field of a scenario, of a section that is there or left out, whole or one number of it."""
+
+    def places(model, before=()):
+        for name, field in fields(model).items():
+            yield (*before, name)
+            for inner in models(field.annotation):
+                yield from places(inner, (*before, name))
+
+    full = complete_data(FIG1)
+    bare = {name: full[name] for name in ("name", "robot", "posture", "law", "duration")}
+    written = 0
+    for place, tail, data in itertools.product(
+        set(places(Scenario)), ((), ("1",), ("3",), ("1", "1")), (bare, full)
+    ):
+        try:
+            target = locate(data, ".".join((*place, *tail)))
+        except PathRefusedError:
+            continue
+        target.put(data, 1.0)
+        written += 1
+    assert written > 200
 
 
 U01 = "{distribution: uniform, low: 0, high: 1}"

@@ -30,7 +30,7 @@ class Target:
     ----------
     place: Names and indices from 0 that lead to the entry.
     indices: The last ones of them, into the numbers of one field.
-    numbers: The numbers that the field has when the scenario does not write a list, one per joint.
+    numbers: The numbers that the field has when the scenario does not write a list: its default, or one per joint.
     quantity: What the field takes if it is a quantity.
     words: What it takes if it is a word. A field that is neither takes true or false.
     alone, per_joint: Whether the entry takes one value, and one per joint.
@@ -145,9 +145,10 @@ def _entry(
         if words or field.annotation is bool:
             return Target(place, words=words)
         raise PathRefusedError(f"is not a number: {field.description}")
+    shapes, numbers = quantity.shapes, tuple[float, ...]()
     if value is None and not field.is_required():
         value = field.default
-    shapes, numbers = quantity.shapes, tuple[float, ...]()
+        numbers = value if isinstance(value, tuple) else ()
     if rest and (None,) in shapes and isinstance(value, int | float):
         value = numbers = (value,) * joints
     if rest and not isinstance(value, list | tuple):
