@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
 import warnings
 from pathlib import Path
@@ -40,7 +41,7 @@ def test_what_is_published_lies_in_the_range_of_an_estimate(name: str) -> None:
 
 def test_the_class_of_drives_goes_by_the_strongest_joint_unless_it_is_said() -> None:
     assert drive_of(None, np.array([3.0, 1.0]))[0] == "servo"
-    assert drive_of(None, np.array([87.0, 12.0]))[0] == "sensed"
+    assert drive_of(None, np.array([87.0, 12.0]))[0] == "industrial"  # torque sensors are rare
     assert drive_of("direct", np.array([87.0]))[1] is DRIVES["direct"]
     with pytest.raises(NameUnknownError, match="unknown class of drives; got 'spring'; needs one of direct"):
         drive_of("spring", np.ones(1))
@@ -160,14 +161,23 @@ def test_a_template_takes_arguments_and_meshes_of_other_packages_do_not_matter(
     (tmp_path / "must.urdf.xacro").write_text(text.replace('<xacro:arg name="most" default="3"/>', ""))
     monkeypatch.chdir(tmp_path)
     shell = Shell(monkeypatch, capsys)
-    made = shell("robot", "new", "arm.urdf.xacro", "--xacro", "most=7")
+    made = shell("robot", "new", "arm.urdf.xacro", "--xacro", "most:=7")
     assert made.status == 0, made.err
+    other = shell("robot", "new", "arm.urdf.xacro", "--xacro", "most=8", "--out", "other.yaml")
+    assert other.status == 0, other.err
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        np.testing.assert_array_equal(FlexibleJointRobot.load(tmp_path / "arm.yaml").torque_limit, [7] * 4)
+        for name, most in (("arm", 7), ("other", 8)):  # each with an expansion of its own
+            robot = FlexibleJointRobot.load(tmp_path / f"{name}.yaml")
+            assert robot.name == name
+            np.testing.assert_array_equal(robot.torque_limit, [most] * 4)
     without = shell("robot", "new", "must.urdf.xacro")
     assert without.status == 2
-    assert "try --xacro NAME=VALUE for each argument" in " ".join(without.err.split())
+    assert "try --xacro NAME=VALUE; its arguments and their defaults: none" in " ".join(without.err.split())
+    (tmp_path / "there.urdf").write_text("mine")
+    there = shell("robot", "new", "arm.urdf.xacro", "--out", "there.yaml")
+    assert "would be expanded into a file that is there; got there.urdf" in " ".join(there.err.split())
+    assert (tmp_path / "there.urdf").read_text() == "mine"
     bad = shell("robot", "new", "must.urdf.xacro", "--xacro", "most")
     assert bad.status == 2
     assert "needs NAME=VALUE" in " ".join(bad.err.split())
@@ -178,4 +188,54 @@ def test_without_the_package_a_template_is_refused_with_how_to_get_it(
 ) -> None:
     monkeypatch.setattr("passiflex.robots.xacro.find_spec", lambda name: None)
     with pytest.raises(RobotError, match=r"is a xacro template; needs plain URDF; try pip install"):
-        expanded(tmp_path / "arm.xacro", tmp_path)
+        expanded(tmp_path / "arm.xacro", tmp_path / "arm.urdf")
+
+
+def test_an_expansion_that_is_no_robot_leaves_nothing_behind(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    pytest.importorskip("xacrodoc")
+    head = '<robot name="m" xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:arg name="kind" default="a"/>'
+    (tmp_path / "macro.urdf.xacro").write_text(head + '<xacro:macro name="x"/><link name="base"/></robot>')
+    (tmp_path / "arg.urdf.xacro").write_text(head + '<xacro:include filename="$(arg kind).xacro"/></robot>')
+    monkeypatch.chdir(tmp_path)
+    shell = Shell(monkeypatch, capsys)
+    assert shell("robot", "new", "macro.urdf.xacro").status == 2
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["arg.urdf.xacro", "macro.urdf.xacro"]
+    assert "defaults: kind=a" in " ".join(shell("robot", "new", "arg.urdf.xacro").err.split())
+    assert "there is no such file" in shell("robot", "new", "nowhere.urdf").err
+
+
+def test_names_that_yaml_takes_for_something_else_are_quoted(tmp_path: Path) -> None:
+    for name in ("850", "null", "on"):
+        (tmp_path / f"{name}.urdf").write_text(tree(4))
+        (tmp_path / f"{name}.yaml").write_text(new_robot_file(tmp_path / f"{name}.urdf").text)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            assert FlexibleJointRobot.load(tmp_path / f"{name}.yaml").name == name
+
+
+def test_a_slide_has_numbers_by_what_it_carries(tmp_path: Path) -> None:
+    """A force of 2000 N is no torque of 2000 N m: it swings at 20 Hz with what it carries."""
+    text = tree(4).replace('type="revolute"', 'type="prismatic"', 1)
+    (tmp_path / "arm.urdf").write_text(text)
+    made = new_robot_file(tmp_path / "arm.urdf")
+    chain = made.read.chain
+    slide = next(i for i, joint in enumerate(chain.joints) if joint.kind == "prismatic")
+    carried = sum(body.mass for body in chain.bodies[slide:])
+    K, B = (made.estimates[entry].value[slide] for entry in ("joint_stiffness", "motor_inertia"))
+    assert np.sqrt(K / carried) / (2 * np.pi) == pytest.approx(20)
+    assert pytest.approx(carried) == B
+    assert "slides: 20 Hz" in made.text.replace("\n    ", " ")
+
+
+def test_placeholders_are_noticed() -> None:
+    arm = FlexibleJointRobot.load("ur5e")
+    seen = once_over(arm)
+    speeds = np.where(np.arange(6) == 0, 0.0, arm.velocity_limit)
+    alike = np.full(6, 11 * seen.weight.max())
+    found = " ".join(oddities(dataclasses.replace(arm, torque_limit=alike, velocity_limit=speeds), seen))
+    assert "all torque limits are" in found
+    assert "are they placeholders?" in found
+    assert f"{arm.arm.chain.joints[0].name!r} has a speed limit of 0" in found
+    assert list(oddities(arm, seen)) == []

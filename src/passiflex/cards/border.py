@@ -10,25 +10,18 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from passiflex.cards.setting import ROTATION, TRANSLATION, Scales, Setting
+from passiflex.cards.setting import ROTATION, SCALES, TRANSLATION, Scales, Setting
 from passiflex.cards.spread import Spread
 from passiflex.stability.modes import Spectrum
 
 Array = NDArray[np.float64]
 Gains = Mapping[str, Array]
 
-STIFFEST = {"translation": 30_000.0, "rotation": 3_000.0}
-"""[N/m], [N m/rad] Nothing stiffer is looked for: the springs of the joints are softer."""
 BEGUN = {
     "translation": (1000.0, 300.0, 3000.0, 100.0, 10_000.0, 30.0, 10.0),
     "rotation": (30.0, 100.0, 10.0, 300.0, 3.0, 1.0),
 }
 """K_x from which on the largest one is looked for: the first that holds [N/m], [N m/rad]."""
-SCALES: tuple[Scales, ...] = (
-    (1.0, 1.0), (0.5, 1.0), (0.5, 0.5), (1.0, 0.5), (2.0, 1.0), (0.25, 1.0), (0.25, 0.5), (0.25, 0.25), (0.125, 0.5),
-    (4.0, 1.0), (2.0, 2.0), (1.0, 2.0),
-)  # fmt: skip
-"""Multiples of the designed damping that are tried, of translation and rotation, the likeliest first."""
 WIDEST = 16.0
 """How many times the damping is raised or lowered at most."""
 STEP = 1.15
@@ -38,14 +31,15 @@ WIDE, INSIDE = 1.3, 1.15
 FINE = 1.04
 """Ratio to which a border is found."""
 LOWERED = 0.8
-"""By which K_x is lowered when a search of the box finds a robot that does not hold."""
+"""By which K_x is lowered when a search of the box finds a robot that does not hold; by its square the second time."""
 BEYOND = 1.1
 """By which K_x is raised until something does not hold, to see what that is."""
 MOST_BEYOND = 40
-SEARCHES = 10
-SLOWEST, FASTEST, FASTER = 20.0, 20_000.0, 4.0
+LOWERINGS, TRIES = 8, 2
+"""How often what a search does not pass is lowered, and how many dampings are searched before that."""
+SLOWEST, FASTEST, FASTER = 20.0, 20_000.0, 2.0
 """[Hz] Between which the lowest rate is looked for; and from how many times its own rate on."""
-LATEST = 40
+LATEST = 18
 """Periods of delay at most."""
 
 
@@ -57,7 +51,7 @@ class Window(NamedTuple):
     beside: float
 
 
-NO_WINDOW = Window(math.nan, math.nan, math.nan)
+NO_WINDOW, NOWHERE = Window(math.nan, math.nan, math.nan), (math.nan, math.nan)
 
 
 class Border(NamedTuple):
@@ -66,15 +60,17 @@ class Border(NamedTuple):
     Attributes
     ----------
     part: translation or rotation.
-    stiffness: [N/m] or [N m/rad]; 0 if nothing was found that holds, infinite if all up to `STIFFEST` does.
+    stiffness: [N/m] or [N m/rad]; 0 if nothing was found that holds.
+    there: D_x of translation and rotation with which it holds [N s/m], [N m s/rad].
     damping: What D_x may be at half of it.
-    mode: What does not die out beyond.
+    mode: What does not die out beyond; None where nothing stiffer was looked for.
     joint: Whose name.
     posture: At which, (n,) rad.
     """
 
     part: str
     stiffness: float
+    there: tuple[float, float]
     damping: Window
     mode: Spectrum | None
     joint: str
@@ -84,7 +80,7 @@ class Border(NamedTuple):
     def why(self) -> str:
         """Return what limits it, in words."""
         if self.mode is None:
-            return "nothing up to there"
+            return "the springs of the joints"
         body = "links" if self.mode.link_share > 0.5 else "motor"
         where = f"at {self.mode.frequency:.0f} Hz" if self.mode.frequency > 0.5 else "slowly"
         return f"the {body} of {self.joint} {where}"
@@ -104,32 +100,49 @@ def border(setting: Setting | Spread, part: str, *, thorough: bool = True, most:
     thorough: Whether the box is searched at every posture.
     most: Nothing stiffer is looked for.
     """
-    scales = list(SCALES)
 
-    def scale_for(k: float) -> Scales | None:
-        pair = stiffness_of(part, k)
-        found = next((s for s in scales if setting.holds(setting.gains(*pair, s))), None)
-        if found is not None:
-            scales.insert(0, scales.pop(scales.index(found)))  # what has just held is asked first
-        return found
+    def holds(k: float) -> bool:
+        return borne(setting, part, k) is not None
 
-    begun = next((k for k in BEGUN[part] if scale_for(k) is not None), 0.0)
-    cap = min(most, STIFFEST[part])
-    k = _largest(lambda k: scale_for(k) is not None, min(begun, cap), cap) if begun else 0.0
-    for _ in range(SEARCHES if k else 0):
-        scale = scale_for(k)
-        gains = setting.gains(*stiffness_of(part, k), scale or SCALES[0])
-        if scale is not None and setting.searched(gains, thorough=thorough):
+    begun, cap = next((k for k in BEGUN[part] if holds(k)), 0.0), min(most, setting.stiffest[part])
+    k = _largest(holds, min(begun, cap), cap) if begun else 0.0
+    for lowering in range(1, 1 + LOWERINGS if k else 1):
+        scales = searched(setting, part, k, thorough=thorough)
+        if scales is not None and (window := damping_window(setting, part, k / 2)) is not NO_WINDOW:
             break
-        k *= LOWERED
-    else:
-        k = 0.0  # what no search has passed is not called safe
-    if not k:
-        return Border(part, 0.0, NO_WINDOW, *_failing(setting, part, BEGUN[part][-1], SCALES[0]))
-    window = damping_window(setting, part, k / 2)
-    if k >= STIFFEST[part]:
-        return Border(part, math.inf, window, None, "", setting.worst(gains).angles)
-    return Border(part, k, window, *_failing(setting, part, k, scales[0]))
+        k *= LOWERED**lowering
+    else:  # what no search has passed is not called safe
+        return Border(part, 0.0, NOWHERE, NO_WINDOW, *_failing(setting, part, BEGUN[part][-1], SCALES[0]))
+    gains = _gains(setting, part, k, scales)
+    there = float(gains["damping"][0, 0]), float(gains["damping"][-1, -1])
+    if k >= cap:
+        return Border(part, k, there, window, None, "", setting.worst(gains).angles)
+    return Border(part, k, there, window, *_failing(setting, part, k, scales))
+
+
+def searched(setting: Setting | Spread, part: str, k: float, *, thorough: bool = False) -> Scales | None:
+    """Return a damping with which a K_x holds and no search finds anything that does not, if there is one."""
+    for _ in range(TRIES):
+        scales = borne(setting, part, k)
+        if scales is None or setting.searched(_gains(setting, part, k, scales), thorough=thorough):
+            return scales
+    return None
+
+
+def borne(
+    setting: Setting | Spread, part: str, k: float, period: float | None = None, delay: float | None = None
+) -> Scales | None:
+    """Return a damping with which a K_x holds on all robots that are known; what has held last is asked first."""
+    order = setting.order
+    for i, scales in enumerate(order):
+        if setting.holds(_gains(setting, part, k, scales), period, delay):
+            order.insert(0, order.pop(i))
+            return scales
+    return None
+
+
+def _gains(setting: Setting | Spread, part: str, k: float, scales: Scales) -> Gains:
+    return setting.gains(*stiffness_of(part, k), scales)
 
 
 def damping_window(setting: Setting | Spread, part: str, k: float) -> Window:
@@ -161,7 +174,7 @@ def _searched_end(setting: Setting | Spread, gains: Callable[[float], Gains]) ->
     return 0.0
 
 
-def slowest_clock(setting: Setting, k: float) -> float:
+def slowest_clock(setting: Setting, k: float, *, search: bool = True, thorough: bool = False) -> float:
     """Return the lowest rate [Hz] at which a translational K_x holds, with the delay in periods that it has; or inf.
 
     It holds at all rates that were tried from there up to `FASTER` times its own, or to `FASTEST` if not at that.
@@ -169,30 +182,39 @@ def slowest_clock(setting: Setting, k: float) -> float:
     periods = setting.delay * setting.rate
 
     def holds(rate: float) -> bool:
-        return any(setting.holds(setting.gains(k, ROTATION, s), 1 / rate, periods / rate) for s in SCALES)
+        return borne(setting, "translation", k, 1 / rate, periods / rate) is not None
 
     top = next((rate for rate in (FASTER * setting.rate, FASTEST) if holds(rate)), math.inf)
     if math.isinf(top):
         return math.inf
-    return top / _largest(lambda slower: holds(top / slower), 1.0, top / SLOWEST)
+    rate = top / _largest(lambda slower: holds(top / slower), 1.0, top / SLOWEST)
+    for _ in range(LOWERINGS if search else 0):
+        if searched(setting.at(rate, periods / rate), "translation", k, thorough=thorough):
+            return rate
+        rate *= STEP
+    return math.inf if search else rate
 
 
-def longest_delay(setting: Setting, k: float) -> float:
+def longest_delay(setting: Setting, k: float, *, thorough: bool = False) -> float:
     """Return the longest delay [s] with which a translational K_x holds at the setting's rate; nan if none does."""
     period = 1 / setting.rate
 
     def holds(delay: float) -> bool:
-        return any(setting.holds(setting.gains(k, ROTATION, s), period, delay) for s in SCALES)
+        return borne(setting, "translation", k, period, delay) is not None
 
-    if not holds(0.0):
-        return math.nan
     low, high = 0.0, period
     while high < LATEST * period and holds(high):  # upward, as what is later still may hold again
         low, high = high, high + period
     while high - low > period / 20:
         middle = (low + high) / 2
         low, high = (middle, high) if holds(middle) else (low, middle)
-    return low
+    for _ in range(LOWERINGS):
+        if searched(setting.at(setting.rate, low), "translation", k, thorough=thorough):
+            return low
+        if low == 0:
+            break
+        low = low / STEP if low > period / 10 else 0.0
+    return math.nan
 
 
 def _failing(setting: Setting | Spread, part: str, k: float, scale: Scales) -> tuple[Spectrum, str, Array]:

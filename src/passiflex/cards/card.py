@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 import shlex
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -12,12 +13,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from passiflex.cards.border import SCALES, Border, border, longest_delay, slowest_clock
+from passiflex.cards.border import Border, border, borne, longest_delay, searched, slowest_clock
 from passiflex.cards.folklore import USUAL, Told, folklore
 from passiflex.cards.setting import MARGIN, ROTATION, Setting
-from passiflex.cards.spread import ENTRIES, Spread, assumed, at_shares, range_of
+from passiflex.cards.spread import ENTRIES, Spread, at_shares, range_of
 from passiflex.control.task import PoseTask, PositionTask
-from passiflex.errors import PassiflexError
+from passiflex.errors import PassiflexError, ValueRangeError
 from passiflex.limits import Recommendation, recommend
 from passiflex.limits.one_thread import on_one_thread
 from passiflex.limits.subject import DELAY, RATE, number
@@ -31,6 +32,8 @@ TOOLS = (0.5, 1.0, 2.0)
 """[kg] Masses on the flange beside none."""
 STIFFNESSES = (200.0, 500.0, 1000.0, 3000.0)
 """[N/m] For which the slowest clock and the longest delay are looked for."""
+MOST_LATE = 18.0
+"""Periods of delay at most."""
 SLOW = (100.0, 125.0, 200.0, 500.0)
 """[Hz] Rates at which arms without torque sensors are commanded."""
 RAISED, MOST_RAISED = 1.15, 16.0
@@ -86,12 +89,13 @@ class Card:
     rows: Largest K_x and its damping, by tool and shaping.
     slow: The same at the rates of other interfaces, for an arm without torque sensors.
     clocks: Without shaping, bare flange.
+    springs: What the joint springs alone are at the end effector [N/m].
     shaping: What was found of B_e on the bare flange; None where the arm cannot shape.
     why_not: Why there is no shaping; empty if there is.
     inertia: B_e (n,) [kg m²] that bears the tools too.
     hangs: How the lowest rate hangs on what is assumed.
     folklore: What people say.
-    command: By which the card is made again.
+    command: By which the card is made again, in words if by none.
     """
 
     robot: FlexibleJointRobot
@@ -103,6 +107,7 @@ class Card:
     rows: tuple[Row, ...]
     slow: tuple[Slow, ...]
     clocks: tuple[Clock, ...]
+    springs: float
     shaping: Recommendation | None
     why_not: str
     inertia: Array | None
@@ -125,7 +130,7 @@ class Card:
 def card(
     robot: FlexibleJointRobot | str | Path,
     rate: float | str,
-    delay: float | str = 0.0,
+    delay: float | str | None = None,
     *,
     sensed: bool | None = None,
     report: Report = lambda text: None,
@@ -135,7 +140,7 @@ def card(
     Parameters
     ----------
     robot: Or its name in the catalogue, or the path of its file.
-    rate, delay: [Hz], [s]; text may name a unit.
+    rate, delay: [Hz], [s]; text may name a unit. One period of delay if left out, as no arm has none.
     sensed: Whether it has torque sensors; as its file says if left out, and yes where that says nothing.
     report: Is told what is being done.
 
@@ -144,27 +149,41 @@ def card(
     PassiflexError
         For an unknown robot, a rate or delay that makes no sense, an arm without regular postures.
     """
-    named = robot if not isinstance(robot, FlexibleJointRobot) else robot.name
     arm = robot if isinstance(robot, FlexibleJointRobot) else FlexibleJointRobot.load(robot)
-    hertz, late = number("rate", rate, RATE), number("delay", delay, DELAY)
+    hertz = number("rate", rate, RATE)
+    late = 1 / hertz if delay is None else number("delay", delay, DELAY)
+    if late * hertz > MOST_LATE:
+        raise ValueRangeError(
+            "delay", got=f"{late:g} s", needs=f"at most {MOST_LATE:g} periods, {MOST_LATE / hertz:g} s"
+        )
     told = arm.sensed if sensed is None else sensed
     task = "pose" if arm.n >= LEAST_POSE else "position"
     report(f"{arm.name}: compiling")
     places = workspace_postures(arm, PoseTask() if task == "pose" else PositionTask())
     own = Setting(arm, hertz, late, places, task)
-    rows = _rows(own, shaped=False, report=report)
+    rows = _rows(own, shaped=False, told=told, report=report)
     shaping, why = (None, "the arm measures no joint torque") if not told else _shaping(own, report)
     shaped = None if shaping is None else _shaped(own, shaping)
     if shaped is None:
         shaping, why = None, why or f"no B_e was found that bears tools of up to {TOOLS[-1]:g} kg"
     else:
-        rows += _rows(shaped, shaped=True, report=report)
+        rows += _rows(shaped, shaped=True, told=told, report=report)
     report(f"{arm.name}: clocks")
-    clocks = tuple(Clock(k, slowest_clock(own, k), longest_delay(own, k)) for k in STIFFNESSES)
+    whole = not told  # there is time for it
+    clocks = tuple(
+        Clock(k, slowest_clock(own, k, thorough=whole), longest_delay(own, k, thorough=whole))
+        for k in STIFFNESSES
+    )
     report(f"{arm.name}: what it hangs on")
-    hangs = tuple(_hang(own, entry) for entry in ENTRIES)
+    hangs = tuple(_hangs(own))
     report(f"{arm.name}: folklore")
-    command = f"passiflex card {shlex.quote(str(named))} --rate '{hertz:g} Hz' --delay '{1e3 * late:g} ms'"
+    if isinstance(robot, FlexibleJointRobot):
+        command = f"pf.card of {arm.name!r} as it is in memory, at {hertz:g} Hz with {1e3 * late:g} ms"
+    else:
+        command = (
+            f"passiflex card {shlex.quote(str(robot))} --rate '{hertz:g} Hz' --delay '{1e3 * late:g} ms'"
+        )
+        command += "" if sensed is None else " --sensed" if sensed else " --no-sensed"
     return Card(
         robot=arm,
         rate=hertz,
@@ -175,6 +194,7 @@ def card(
         rows=tuple(rows),
         slow=() if told else tuple(_slow(own, rows[0].border, report)),
         clocks=clocks,
+        springs=own.springs["translation"],
         shaping=shaping,
         why_not=why,
         inertia=None if shaped is None else shaped.inertia,
@@ -184,7 +204,7 @@ def card(
     )
 
 
-def _rows(setting: Setting, *, shaped: bool, report: Report) -> list[Row]:
+def _rows(setting: Setting, *, shaped: bool, told: bool, report: Report) -> list[Row]:
     parts = ("translation", "rotation") if setting.task == "pose" else ("translation",)
     way = "with shaping" if shaped else "without shaping"
     out = []
@@ -199,7 +219,7 @@ def _rows(setting: Setting, *, shaped: bool, report: Report) -> list[Row]:
     for mass in TOOLS:
         report(f"{setting.robot.name}: largest K_x with {mass:g} kg, {way}")
         carrying = dataclasses.replace(setting, tool=mass, _members=list(setting.members))
-        out.append(Row(mass, shaped, border(carrying, "translation", thorough=False)))
+        out.append(Row(mass, shaped, border(carrying, "translation", thorough=not told)))
     return out
 
 
@@ -210,10 +230,7 @@ def _slow(own: Setting, bare: Border, report: Report) -> Iterator[Slow]:
             yield Slow(rate, bare)
             continue
         report(f"{own.robot.name}: largest K_x at {rate:g} Hz")
-        other = dataclasses.replace(
-            own, rate=rate, delay=own.delay * own.rate / rate, _members=list(own.members)
-        )
-        yield Slow(rate, border(other, "translation", thorough=False))
+        yield Slow(rate, border(own.at(rate, own.delay * own.rate / rate), "translation"))
 
 
 def _shaping(own: Setting, report: Report) -> tuple[Recommendation | None, str]:
@@ -239,15 +256,18 @@ def _shaped(own: Setting, found: Recommendation) -> Setting | None:
             dataclasses.replace(own, inner_loop=found.inner_loop, inertia=inertia, tool=mass, _members=[])
             for mass in (0.0, *TOOLS)
         ]
-        if all(any(way.holds(way.gains(USUAL, ROTATION, s)) for s in SCALES) for way in ways):
+        if all(borne(way, "translation", USUAL) for way in ways) and all(
+            searched(way, "translation", USUAL) for way in ways
+        ):
             return ways[0]
         factor *= RAISED
     return None
 
 
-def _hang(own: Setting, entry: str) -> Hang:
-    """Return the lowest rate for a usual K_x at both ends of an entry's range, as multiples of that without it."""
-    low, high = range_of(own.robot, entry)
-    middle = slowest_clock(own, USUAL)
-    ends = [slowest_clock(at_shares(own, {entry: share}), USUAL) / middle for share in (low, high)]
-    return Hang(entry, (low, high), (ends[0], ends[1]), entry in assumed(own.robot))
+def _hangs(own: Setting) -> Iterator[Hang]:
+    """Yield the lowest rate for a usual K_x at both ends of each entry's range, as multiples of that without it."""
+    middle = slowest_clock(own, USUAL, search=False)
+    for entry in ENTRIES if math.isfinite(middle) else ():
+        ends = range_of(own.robot, entry)
+        low, high = (slowest_clock(at_shares(own, {entry: e}), USUAL, search=False) / middle for e in ends)
+        yield Hang(entry, ends, (low, high), own.robot.assumed(entry))

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from passiflex.cards.setting import Setting
 from passiflex.control.motion import hold, moved
 from passiflex.limits.confirmation import disturbed, growth
-from passiflex.problems.altered import altered
 from passiflex.problems.problem import Event
 from passiflex.simulation.simulate_sampled import simulate_unchecked
 
@@ -50,18 +49,17 @@ def folklore(own: Setting) -> Iterator[Told]:
     for k in (USUAL, FOLKLORE):
         K = np.array([k] * 3 + [k / 10] * 3)[:size]
         careless = {"stiffness": np.diag(K), "damping": np.diag(2 * np.sqrt(K))}
-        yield _simulated(own, f"K_x = {k:g} N/m with D_x = 2 √K_x, whatever the inertia", careless)
-        yield _simulated(own, f"K_x = {k:g} N/m, damped by the inertia that moves", own.gains(k, k / 10))
+        both = f"K_x = {k:g} N/m" + (f", {k / 10:g} N m/rad" if size == 6 else "")
+        yield _simulated(own, f"{both}, D_x = 2 √K_x whatever the inertia", careless)
+        yield _simulated(own, f"{both}, damped by the inertia that moves", own.gains(k, k / 10))
 
 
 def _simulated(own: Setting, said: str, gains: Mapping[str, Array]) -> Told:
     """Return what the nonlinear loop does after a step, at the posture and on the robot that like it least."""
     found = own.worst(gains)
-    worst, mode, late = found.member, found.mode(gains), own.box.late(found.member)
-    changed = altered(own.box.problems[worst.posture], gains=gains, plant=own.box.plant(worst))
-    quiet = dataclasses.replace(disturbed(changed), delay=late)
+    mode, quiet = found.mode(gains), disturbed(own.simulated(found.member, gains))
     grown = growth(quiet)
-    goal = moved(changed.home, (0.0, 0.0, STEP), (0.0, 0.0, 0.0))
+    goal = moved(quiet.home, (0.0, 0.0, STEP), (0.0, 0.0, 0.0))
     stepped = dataclasses.replace(
         quiet, events=(Event(0.0, hold(goal), np.zeros(6)),), duration=round(LASTS * own.rate) / own.rate
     )

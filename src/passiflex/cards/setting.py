@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
+import itertools
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -13,6 +16,7 @@ from numpy.typing import NDArray
 
 from passiflex.control.posture import posture
 from passiflex.limits.margin_box import MarginBox, Member
+from passiflex.problems.altered import altered
 from passiflex.problems.problem import SampledProblem, require_sampled
 from passiflex.robots.flexible import FlexibleJointRobot
 from passiflex.scenarios.scenario_file import parse_scenario
@@ -24,12 +28,23 @@ Array = NDArray[np.float64]
 Scales = tuple[float, float]
 """Multiples of the designed damping: of translation and rotation."""
 
+SCALES: tuple[Scales, ...] = tuple(
+    sorted(
+        itertools.product((4.0, 2.8, 2.0, 1.4, 1.0, 0.7, 0.5, 0.35), (2.0, 1.0, 0.5, 0.35)),
+        key=lambda scales: abs(math.log(scales[0])) + abs(math.log(scales[1])),
+    )
+)
+"""What is tried of them, the nearest to the design first."""
+STIFFEST = {"translation": 30_000.0, "rotation": 3_000.0}
+"""[N/m], [N m/rad] Nothing stiffer is looked for, and nothing stiffer than the springs of the joints."""
 MARGIN = 0.2
 """By how much B, K, D and the links' inertia of each joint may be off, and the delay, of a period."""
 RATIO = 0.7
 """Damping ratio of a design, by the inertia that moves."""
 ROTATION, TRANSLATION = 30.0, 500.0
 """K_x of the part that is not looked at [N m/rad], [N/m]."""
+FIXED = 1e-6
+"""Share of the largest mobility below which the end effector cannot go that way."""
 NEAREST = 2
 """Postures at which the box is searched where that is not done at all of them."""
 TOOL_CENTRE, TOOL_RADIUS = 0.08, 0.04
@@ -69,6 +84,7 @@ class Setting:
     inertia: B_e (n,) [kg m²]; B where None, which is no shaping.
     differences: Whether velocities are differences of readings, as on most arms.
     margin: Of the box.
+    order: In which dampings are tried.
     """
 
     robot: FlexibleJointRobot
@@ -82,6 +98,11 @@ class Setting:
     differences: bool = True
     margin: float = MARGIN
     _members: list[Member] = field(default_factory=list)
+    order: list[Scales] = field(default_factory=lambda: list(SCALES))
+
+    def at(self, rate: float, delay: float) -> Setting:
+        """Return it at another rate [Hz] and delay [s], asked of the same robots."""
+        return dataclasses.replace(self, rate=rate, delay=delay, _members=list(self.members))
 
     @property
     def scenario(self) -> dict[str, Any]:
@@ -126,8 +147,16 @@ class Setting:
 
     @cached_property
     def _problems(self) -> tuple[SampledProblem, ...]:
-        texts = (yaml.safe_dump(self.scenario | {"posture": q.tolist()}) for q in self.postures)
-        return tuple(require_sampled(resolve(parse_scenario(text), self.robot)) for text in texts)
+        return tuple(self._problem(q) for q in self.postures)
+
+    def _problem(self, q: Array) -> SampledProblem:
+        text = yaml.safe_dump(self.scenario | {"posture": q.tolist()})
+        return require_sampled(resolve(parse_scenario(text), self.robot))
+
+    def simulated(self, member: Member, gains: Mapping[str, Array]) -> SampledProblem:
+        """Return the nonlinear problem of a robot of the box with these gains, where it stands and as late as it is."""
+        there = altered(self._problem(self.box.angles(member)), gains=gains, plant=self.box.plant(member))
+        return dataclasses.replace(require_sampled(there), delay=self.box.late(member))
 
     @property
     def members(self) -> list[Member]:
@@ -138,7 +167,10 @@ class Setting:
 
     @cached_property
     def felt(self) -> tuple[float, float]:
-        """Return what moves with the end effector, motors included, on average over postures and axes [kg], [kg m²]."""
+        """Return what moves with the end effector, motors included, on average over postures and the ways it can go.
+
+        In kg and kg m².
+        """
         found = []
         for problem in self._problems:
             numbers = problem.law.robot.layout.unpack(problem.model)
@@ -147,9 +179,27 @@ class Setting:
             J, moving = at.jacobian, at.mass_matrix + np.diag(motors)
             mobility = J @ np.linalg.solve(moving, J.T)
             halves = [mobility[:3, :3]] if self.task == "position" else [mobility[:3, :3], mobility[3:, 3:]]
-            found.append([float(np.mean(np.log(np.maximum(np.linalg.eigvalsh(h), 1e-9)))) for h in halves])
+            values = [np.linalg.eigvalsh(half) for half in halves]
+            found.append([float(np.mean(np.log(v[v > FIXED * v[-1]]))) for v in values])
         means = np.exp(-np.mean(found, axis=0))
         return float(means[0]), float(means[-1])
+
+    @cached_property
+    def springs(self) -> dict[str, float]:
+        """Return what the joint springs alone are at the end effector, by part: softest direction, mean of postures."""
+        found = []
+        for problem in self._problems:
+            numbers = problem.law.robot.layout.unpack(problem.model)
+            J = posture(self.robot, problem.q, numbers).jacobian
+            give = J @ np.diag(1 / self.robot.joint_stiffness) @ J.T
+            found.append([np.log(np.linalg.eigvalsh(half)[-1]) for half in (give[:3, :3], give[3:, 3:])])
+        means = np.exp(-np.mean(found, axis=0))
+        return {"translation": float(means[0]), "rotation": float(means[1])}
+
+    @property
+    def stiffest(self) -> dict[str, float]:
+        """Return the K_x beyond which nothing is looked for, by part."""
+        return {part: min(most, self.springs[part]) for part, most in STIFFEST.items()}
 
     def gains(self, translation: float, rotation: float, scales: Scales = (1.0, 1.0)) -> dict[str, Array]:
         """Return K_x and D_x, isotropic; the damping is `scales` times that of `RATIO`."""
@@ -189,14 +239,16 @@ class Setting:
         return loop.radius(1 / self.rate, late, gains)
 
     def searched(self, gains: Mapping[str, Array], *, thorough: bool = True) -> bool:
-        """Return whether nothing that fails is found in the box; what is found is asked from then on.
+        """Return whether nothing that fails is found in the box; what is found is asked from then on, in all postures.
 
         Thorough: at every posture; else at those two where the robots that are known die out last.
         """
-        for place in range(len(self.postures)) if thorough else self._nearest(gains):
+        places = range(len(self.postures))
+        for place in places if thorough else self._nearest(gains):
             worst = self.box.search(gains, place, thorough=False)
             if not worst.stable:
-                self.members.insert(0, worst.member)
+                alike = (worst.member._replace(posture=other) for other in places if other != place)
+                self.members[:0] = [worst.member, *(m for m in alike if not self.radius(m, gains) < 1)]
                 return False
         return True
 

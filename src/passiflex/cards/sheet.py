@@ -8,21 +8,24 @@ from typing import NamedTuple
 
 import numpy as np
 
-from passiflex.cards.border import STIFFEST
+from passiflex.cards.border import BEGUN, Border
 from passiflex.cards.card import NOISE, Card, Row
 from passiflex.cards.folklore import FOLKLORE, USUAL, Told
-from passiflex.cards.setting import MARGIN, NEAREST, RATIO, ROTATION, TOOL_CENTRE, TRANSLATION
-from passiflex.cards.spread import assumed, range_of
-from passiflex.control.posture import posture
-from passiflex.limits.margin_box import NEAR
+from passiflex.cards.setting import MARGIN, NEAREST, RATIO, ROTATION, SCALES, TOOL_CENTRE, TRANSLATION
+from passiflex.cards.spread import range_of, uncertain
+from passiflex.limits.margin_box import NEAR, SETTLING
 from passiflex.origin import package_version
 from passiflex.robots.once_over import once_over
 from passiflex.stability.clock_words import delay_words, hertz
 
-UNITS = {"translation": ("N/m", "N s/m"), "rotation": ("N m/rad", "N m s/rad")}
+UNITS = {"translation": "N/m", "rotation": "N m/rad"}
 
 
-OTHER = {"translation": "rotation", "rotation": "translation"}
+LEAST_RATIO = RATIO * min(push for push, _ in SCALES)
+NONE = (
+    f"no K_x of {BEGUN['translation'][-1]:g} N/m or more with {LEAST_RATIO:.0%} of critical damping or more"
+)
+"""What *none* means, in words."""
 
 
 class Table(NamedTuple):
@@ -60,28 +63,43 @@ def title(card: Card) -> str:
 
 
 def _answer(card: Card) -> Block:
-    seen, robot = once_over(card.robot), card.robot
-    motors = card.bare.border
-    safe = _stiff(motors.stiffness, "translation")
-    lines = [
-        f"Without shaping (K_e = K, B_e = B) the motors' side bears K_x {safe} in translation; limit: {motors.why}.",
-        f"{robot.n} joints, {seen.mass:.3g} kg that move, {seen.reach:.3g} m; motors held, its links swing at "
-        f"{seen.swing:.3g} Hz and more.",
-    ]
-    lines.append(
-        f"Joint springs alone give way as {_compliance(card):.3g} N/m does: nothing at its end effector is stiffer."
-    )
-    if card.surest.over:
-        ends = [(entry, range_of(robot, entry)) for entry in assumed(robot)]
-        words = ", ".join(f"{entry} {low:.2g} to {high:.2g} times" for entry, (low, high) in ends)
-        borne = card.surest.border.stiffness
-        surest = (
-            f"Whatever they are in these ranges, it bears {_stiff(borne, 'translation')}."
-            if borne
-            else "No gain holds for all that they may be in these ranges: measure them before you trust the first line."
+    seen, robot, surest, bare = once_over(card.robot), card.robot, card.surest.border, card.bare.border
+    lines = []
+    if bare.stiffness:
+        who = (
+            "Whatever is assumed of its joints"
+            if card.surest.over and surest.stiffness
+            else "With its joints as they are"
         )
-        lines.append(f"Assumed, not measured: {words}. {surest}")
+        lines.append(f"{who}: {_advice(surest if surest.stiffness else bare, turning=card.task == 'pose')}.")
+        largest = _stiff(bare.stiffness, "translation")
+        lines.append(
+            f"Without shaping (K_e = K, B_e = B) K_x {largest} holds in translation; limit: {bare.why}."
+        )
+    else:
+        lines.append(f"Nothing to advise: at this rate there is {NONE}; limit: {bare.why}.")
+    if card.surest.over:
+        ends = [(entry, range_of(robot, entry)) for entry in uncertain(robot)]
+        words = ", ".join(f"{entry} {low:.2g} to {high:.2g} times" for entry, (low, high) in ends)
+        borne = (
+            f"On all robots of these ranges that were tried K_x {_stiff(surest.stiffness, 'translation')} holds."
+            if surest.stiffness
+            else f"For all of these robots there is {NONE}: measure them before you trust the first line."
+        )
+        lines.append(f"Assumed, or not well known: {words}, all joints alike. {borne}")
+    lines.append(
+        f"{robot.n} joints, {seen.mass:.3g} kg that move, {seen.reach:.3g} m; motors held, its links swing at "
+        f"{seen.swing:.3g} Hz and more, and the springs of its joints give way as {card.springs:.3g} N/m does in the "
+        "softest direction, on average over the postures: no gain makes that stiffer, and none is looked for."
+    )
     return Block("Answer", tuple(lines))
+
+
+def _advice(b: Border, *, turning: bool) -> str:
+    """Return gains with room to all sides."""
+    k, d = _stiff(b.stiffness / 2, b.part).removeprefix("up to "), b.damping
+    rotation = f", rotation at {ROTATION:g} N m/rad with {d.beside:.3g} N m s/rad" if turning else ""
+    return f"set K_x to {k} or less with D_x from {d.least:.3g} to {d.most:.3g} N s/m at that{rotation}"
 
 
 def summary(card: Card) -> tuple[str, str, str]:
@@ -91,42 +109,47 @@ def summary(card: Card) -> tuple[str, str, str]:
     return _stiff(card.bare.border.stiffness, "translation"), surest, _rate(usual.rate)
 
 
-def _compliance(card: Card) -> float:
-    """Return the stiffness of the joints at the end effector, softest direction, on average over the postures [N/m]."""
-    found = []
-    for q in card.postures:
-        J = posture(card.robot, q, card.robot.nominal()).jacobian[:3]
-        found.append(np.linalg.eigvalsh(J @ np.diag(1 / card.robot.joint_stiffness) @ J.T)[-1])
-    return float(1 / np.exp(np.mean(np.log(found))))
-
-
 def _stiffness(card: Card) -> Block:
-    rows = tuple(_row(row, turning=card.task == "pose") for row in card.rows)
-    columns = ("tool", "joints", "of", "largest K_x", "D_x at half of it", "limit")
-    return Block("Largest safe K_x", (), Table(columns, rows))
+    turning = card.task == "pose"
+    rows = tuple(_row(row, turning=turning) for row in card.rows)
+    columns = ("tool", "joints", "of", "largest K_x", "with D_x", "D_x at half of that K_x", "limit")
+    return Block("Largest safe K_x", (_dampings(turning=turning),), Table(columns, rows))
+
+
+def _dampings(*, turning: bool) -> str:
+    if not turning:
+        return "D_x in N s/m."
+    other = f"the other K_x is {ROTATION:g} N m/rad, or {TRANSLATION:g} N/m"
+    return f"D_x of translation in N s/m; of rotation in N m s/rad; {other}."
 
 
 def _row(row: Row, *, turning: bool) -> tuple[str, ...]:
     b = row.border
-    damp = UNITS[b.part][1]
-    low, high, beside = b.damping
-    window = "–" if math.isnan(low) else f"{low:.3g} to {high:.3g} {damp}"
-    if turning and not math.isnan(low):
-        window += f", {beside:.2g} {UNITS[OTHER[b.part]][1]} beside"
     tool = f"{row.tool:g} kg" if row.tool else "none"
     joints = "shaped" if row.shaped else "anywhere in range" if row.over else "as they are"
-    return tool, joints, b.part, _stiff(b.stiffness, b.part), window, b.why
+    return tool, joints, b.part, _stiff(b.stiffness, b.part), *_damped(b, turning=turning), b.why
+
+
+def _damped(b: Border, *, turning: bool) -> tuple[str, str]:
+    """Return D_x with the largest K_x, and at half of it."""
+    if math.isnan(b.damping.least):
+        return "–", "–"
+    (push, turn), half = (
+        (f"{value:.3g}" for value in b.there),
+        f"{b.damping.least:.3g} to {b.damping.most:.3g}",
+    )
+    if not turning:
+        return push, half
+    beside = f"{b.damping.beside:.3g}"
+    return f"{push}; {turn}", f"{half}; {beside}" if b.part == "translation" else f"{beside}; {half}"
 
 
 def _stiff(value: float, part: str) -> str:
     """Return a stiffness, rounded down."""
-    unit, most = UNITS[part][0], STIFFEST[part]
     if value == 0:
         return "none"
-    if math.isinf(value):
-        return f"up to {most:g} {unit} and more"
     size = 10.0 ** (math.floor(math.log10(value)) - 1)
-    return f"up to {math.floor(value / size) * size:g} {unit}"
+    return f"up to {math.floor(value / size) * size:g} {UNITS[part]}"
 
 
 def _slow(card: Card) -> Block:
@@ -137,7 +160,7 @@ def _slow(card: Card) -> Block:
     return Block(
         "At other rates",
         (f"Translation, joints as they are, no tool, {delay_words(card.delay * card.rate)}.",),
-        Table(("rate", "largest K_x", "D_x at half of it", "limit"), rows),
+        Table(("rate", "largest K_x", "with D_x", "D_x at half of that K_x", "limit"), rows),
     )
 
 
@@ -225,16 +248,18 @@ def _made(card: Card) -> Block:
 
 
 def _how(card: Card, task: str) -> Iterator[str]:
+    few = f"; with tools, for other rates and delays: at the {NEAREST} postures nearest to the limit"
     yield (
         f"Safe: the sampled loop is stable at {len(card.postures)} postures over the workspace on every robot that was "
         f"tried of a box: B, K, D and the links' inertia of each joint off by {100 * MARGIN:g} %, the delay by "
-        f"{MARGIN:g} periods, corners and a search uphill (with tools, in range, at other rates: at the {NEAREST} "
-        f"postures nearest to the limit), joints up to {NEAR:g} rad beside."
+        f"{MARGIN:g} periods, joints up to {NEAR:g} rad beside. A search goes uphill in it, for what does not die out "
+        f"at {SETTLING:g} 1/s or faster{few if card.sensed else ''}; for the ends of D_x at the {NEAREST} nearest."
     )
     yield (
-        f"Task: {task}. Velocities are differences of readings. The other part of K_x is {ROTATION:g} N m/rad or "
-        f"{TRANSLATION:g} N/m; D_x in steps of 2 around {RATIO:g} of critical by the inertia that moves. A tool is a "
-        f"body {1e3 * TOOL_CENTRE:g} mm above the flange, known to the law."
+        f"Task: {task}. Velocities are differences of readings. D_x in steps of √2, and less than {LEAST_RATIO:.0%} of "
+        f"critical by the inertia that moves is not tried. A tool is a body {1e3 * TOOL_CENTRE:g} mm above the flange, "
+        "known to the law."
     )
+    yield f"None: {NONE}, by the inertia that moves as the robot file has it."
     yield "Not in it: play and stiction, limits of torque, resolution of encoders, contact with anything."
     yield f"Made by passiflex {package_version()}: {card.command}"

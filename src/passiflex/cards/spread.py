@@ -20,15 +20,15 @@ ENTRIES = ("joint_stiffness", "joint_damping", "motor_inertia")
 """What a robot file may have to assume, and a card hangs on."""
 BRIDGED = 1.5
 """Ratio of two stiffnesses that a margin of 20 % to either side leaves no gap between."""
-LAST = 3
+LAST = 2
 """Robots whose boxes are searched."""
 UNSAID = (0.5, 2.0)
 """Range of an entry that has none in its file."""
 
 
-def assumed(robot: FlexibleJointRobot) -> tuple[str, ...]:
-    """Return the entries of a robot that are assumed."""
-    return tuple(entry for entry in ENTRIES if "assumed" in robot.sources.get(entry, ""))
+def uncertain(robot: FlexibleJointRobot) -> tuple[str, ...]:
+    """Return the entries of a robot that are assumed, or have a range."""
+    return tuple(entry for entry in ENTRIES if entry in robot.ranges or robot.assumed(entry))
 
 
 def range_of(robot: FlexibleJointRobot, entry: str) -> tuple[float, float]:
@@ -52,7 +52,7 @@ def _spread(robot: FlexibleJointRobot) -> Iterator[tuple[tuple[str, float], ...]
     A resonance meets the clock anywhere: so the stiffness goes in steps that its margin bridges, with the least
     damping that there may be.
     """
-    ends = {entry: range_of(robot, entry) for entry in assumed(robot)}
+    ends = {entry: range_of(robot, entry) for entry in uncertain(robot)}
     low, high = ends.get(ENTRIES[0], (1.0, 1.0))
     steps = np.geomspace(low, high, 1 + math.ceil(math.log(high / low) / math.log(BRIDGED)))
     between = {ENTRIES[0]: tuple(steps.tolist()), ENTRIES[1]: ends.get(ENTRIES[1], (1.0,))[:1]}
@@ -81,6 +81,17 @@ class Spread:
         """Return the setting of the robot as its file has it."""
         return self.settings[0]
 
+    @property
+    def order(self) -> list[Scales]:
+        """Return in which order dampings are tried."""
+        return self.nominal.order
+
+    @property
+    def stiffest(self) -> dict[str, float]:
+        """Return the K_x beyond which nothing is looked for: where the softest springs end."""
+        found = [setting.stiffest for setting in self.settings]
+        return {part: min(one[part] for one in found) for part in found[0]}
+
     def gains(self, translation: float, rotation: float, scales: Scales = (1.0, 1.0)) -> dict[str, Array]:
         """Return K_x and D_x by the robot as its file has it, as nobody knows another one."""
         return self.nominal.gains(translation, rotation, scales)
@@ -88,7 +99,7 @@ class Spread:
     def holds(
         self, gains: Mapping[str, Array], period: float | None = None, delay: float | None = None
     ) -> bool:
-        """Return whether all hold; the one that failed last is asked first."""
+        """Return whether all hold, as those of `Setting`; the one that failed last is asked first."""
         for setting in sorted(self.settings, key=lambda s: s is not self._last[0]):
             if not setting.holds(gains, period, delay):
                 self._last[0] = setting

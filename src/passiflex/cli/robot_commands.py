@@ -15,6 +15,10 @@ if TYPE_CHECKING:
     from passiflex.robots.once_over import OnceOver
 
 
+NOTHING = 1e-9
+"""[N m, N] A weight that is none."""
+
+
 def new(
     urdf: Path,
     /,
@@ -36,6 +40,7 @@ def new(
 
     The longest chain without names; a xacro is expanded where the package xacrodoc is there.
     """
+    from passiflex.errors import PassiflexError, RobotError
     from passiflex.files import OutputError, require_writable, whole_file
     from passiflex.robots.catalogue import read_description
     from passiflex.robots.doubts import doubts
@@ -43,14 +48,26 @@ def new(
     from passiflex.robots.new_file import new_robot_file
     from passiflex.robots.xacro import expanded
 
+    if not urdf.exists():
+        raise RobotError("there is no such file", got=str(urdf), needs="a URDF, or a template of xacro")
     target = out or urdf.with_name(urdf.name.split(".")[0] + ".yaml")
     if target.exists():
         raise OutputError("the file to write is there already", got=str(target), try_="--out OTHER.yaml")
     require_writable(target.parent)
-    plain = expanded(urdf, target.parent, _pairs(xacro))
-    made = new_robot_file(
-        plain, base=base, end_effector=end_effector, drive=drive, folder=target.parent.resolve()
-    )
+    plain = expanded(urdf, target.with_suffix(".urdf"), _pairs(xacro))
+    try:
+        made = new_robot_file(
+            plain,
+            base=base,
+            end_effector=end_effector,
+            drive=drive,
+            folder=target.parent.resolve(),
+            name=target.stem,
+        )
+    except PassiflexError:
+        if plain != urdf:
+            plain.unlink()  # an expansion that is of no use
+        raise
     with whole_file(target) as temporary:
         temporary.write_text(made.text, encoding="utf-8")
     for remark in made.read.remarks:
@@ -63,8 +80,9 @@ def new(
         console.print(f"looks wrong: {doubt}")
     _print(robot)
     console.print(
-        f"assumed, for {made.drive} drives: joint_stiffness, joint_damping, motor_inertia; which of them the answer "
-        f"hangs on: passiflex card {target} --rate '1 kHz'"
+        f"assumed, for {made.drive} drives{'' if drive else ', which is a guess: --drive says which they are'}: "
+        f"joint_stiffness, joint_damping, motor_inertia, torque sensors; which of them the answer hangs on: "
+        f"passiflex card {target} --rate '1 kHz' --delay '1 ms'"
     )
     return 0
 
@@ -75,7 +93,8 @@ def _pairs(written: tuple[str, ...]) -> dict[str, str]:
     for pair in written:
         if "=" not in pair:
             raise ArgumentError(pair, "NAME=VALUE", "ur_type=ur5e, with no spaces")
-    return dict(pair.split("=", 1) for pair in written)
+    pairs = (pair.replace(":=", "=", 1).split("=", 1) for pair in written)
+    return dict(pairs)
 
 
 def check(robot: str, /) -> int:
@@ -97,7 +116,7 @@ def _print(robot: FlexibleJointRobot) -> None:
     )
     console.print(f"motors held, its links swing at {seen.swing:.3g} Hz and more, slowest at {name!r}")
     console.print(f"motors free, the slowest resonance of a joint is at {seen.resonance:.3g} Hz")
-    assumed = [entry for entry, source in robot.sources.items() if "assumed" in source]
+    assumed = [entry for entry in robot.sources if robot.assumed(entry)]
     if assumed:
         console.print(f"assumed: {', '.join(assumed)}")
     for oddity in oddities(robot, seen):
@@ -108,7 +127,7 @@ def _table(robot: FlexibleJointRobot, seen: OnceOver) -> object:
     from rich.table import Table
 
     chain = robot.arm.chain
-    table = Table("joint", "moves", "K", "D", "B", "weight, at most", "torque limit", title=robot.name)
+    table = Table("joint", "link", "K", "D", "B", "weight, at most", "torque limit", title=robot.name)
     for i, (joint, body) in enumerate(zip(chain.joints, chain.bodies, strict=True)):
         table.add_row(
             joint.name,
@@ -116,7 +135,7 @@ def _table(robot: FlexibleJointRobot, seen: OnceOver) -> object:
             f"{robot.joint_stiffness[i]:.3g}",
             f"{robot.joint_damping[i]:.3g}",
             f"{robot.motor_inertia[i]:.3g}",
-            f"{seen.weight[i]:.3g}",
+            f"{seen.weight[i] if seen.weight[i] > NOTHING else 0:.3g}",
             f"{robot.torque_limit[i]:.4g}",
         )
     return table
@@ -127,7 +146,12 @@ def card(
     /,
     *,
     rate: Annotated[str, cyclopts.Parameter(help="control rate, as '1 kHz'")],
-    delay: Annotated[str, cyclopts.Parameter(help="of a command, as '1 ms'")] = "0 s",
+    delay: Annotated[
+        str | None, cyclopts.Parameter(help="of a command, as '1 ms'; one period if left out")
+    ] = None,
+    sensed: Annotated[
+        bool | None, cyclopts.Parameter(help="whether it has torque sensors; as its file says if left out")
+    ] = None,
     out: Annotated[
         Path | None,
         cyclopts.Parameter(help="folder for ROBOT.html, .pdf and .txt; the page alone is printed without"),
@@ -144,7 +168,7 @@ def card(
             out.mkdir(parents=True, exist_ok=True)
             require_writable(out)
         with progress_lines() as report:
-            made = card_of(robot, rate, delay, report=report)
+            made = card_of(robot, rate, delay, sensed=sensed, report=report)
         console.print(card_text(made), markup=False, highlight=False, soft_wrap=True)
         for form in FORMS if out is not None else ():
             console.print(f"wrote {write_card(made, (out or Path()) / f'{made.robot.name}{form}')}")

@@ -17,12 +17,18 @@ if TYPE_CHECKING:
 
 LINK, JOINT = "#33658a", "#f26419"
 A4 = (8.27, 11.69)
+"""[in]"""
+MARGIN, LARGEST, SMALLEST_PICTURE = 0.05, 7.5, 0.16
+"""Share of the page around the text; size of the letters at most [pt]; share of the page left for the picture."""
+WIDE, HIGH = 0.603, 1.2
+"""Width of a letter and height of a line, in sizes of the letters."""
 
 
 def draw_posture(axes: Axes, card: Card) -> None:
     """Draw the arm from the side, in the plane in which it reaches farthest."""
     q = card.bare.border.posture
-    points = world_frames(card.robot.arm.chain, np.atleast_2d(q)).position[0]
+    chain = card.robot.arm.chain
+    points = world_frames(chain, np.atleast_2d(q)).position[0] @ chain.mount.T
     away = points[-1, :2] - points[0, :2]
     size = float(np.linalg.norm(away))
     along = away / size if size > 1e-9 else np.array([1.0, 0.0])
@@ -50,7 +56,12 @@ def draw_card(card: Card) -> Figure:
 def draw_page(card: Card, text: str) -> Figure:
     """Return the card on a page: its text, and the picture in the corner."""
     figure = Figure(figsize=A4)
-    lines = text.count("\n") + 1
-    figure.text(0.05, 0.97, text, family="monospace", fontsize=min(7.0, 760 / lines), va="top")
-    draw_posture(figure.add_axes((0.72, 0.82, 0.22, 0.15)), card)
+    lines, room = text.rstrip("\n").split("\n"), 1 - 2 * MARGIN
+    by_width = room * A4[0] * 72 / (WIDE * max(map(len, lines)))
+    by_height = (room - SMALLEST_PICTURE) * A4[1] * 72 / (HIGH * len(lines))
+    size = min(LARGEST, by_width, by_height)
+    figure.text(MARGIN, 1 - MARGIN, "\n".join(lines), family="monospace", fontsize=size, va="top")
+    below = 1 - MARGIN - HIGH * len(lines) * size / 72 / A4[1]
+    height = min(below - 2 * MARGIN, 0.25)
+    draw_posture(figure.add_axes((1 - MARGIN - 0.4, below - MARGIN / 2 - height, 0.4, height)), card)
     return figure

@@ -68,7 +68,7 @@ def posture_at(
         if len(reached) >= (ENOUGH if near is None else 1):
             break
     if not reached:
-        nearest = min(found)
+        nearest = min(found, key=lambda one: one.off)
         there = _error(robot, numbers, goal, nearest.q, turned=turned)
         off = f"{1e3 * np.linalg.norm(there[:3]):.3g} mm"
         off += f" and {np.degrees(np.linalg.norm(there[3:])):.3g} deg" if turned else ""

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from passiflex.errors import NameUnknownError
 from passiflex.robots.bodies import Array
@@ -96,8 +97,12 @@ DRIVES: Mapping[str, Drive] = {
     ),
 }  # fmt: skip
 """Name → class of drives."""
+SLIDE_SWING, SLIDE_SHARE, SLIDE_DAMPING = 20.0, 1.0, 0.02
+"""Of a slide: how fast its belt or screw swings with what it carries [Hz], what its motor weighs behind the gear as a
+share of that, and its share of critical damping."""
+SLIDE = "; slides: 20 Hz with what they carry, a motor as heavy as that, 0.02 of critical, of no neighbour"
 WEAKEST_ARM = 15.0
-"""[N m] An arm whose strongest joint is weaker is taken for one of servos."""
+"""[N m] An arm whose strongest joint is weaker is taken for one of servos, any other for one without torque sensors."""
 
 
 def drive_of(name: str | None, rating: Array) -> tuple[str, Drive]:
@@ -109,7 +114,22 @@ def drive_of(name: str | None, rating: Array) -> tuple[str, Drive]:
         For a class that there is not.
     """
     if name is None:
-        name = "servo" if rating.max() < WEAKEST_ARM else "sensed"
+        name = "servo" if rating.max(initial=0.0) < WEAKEST_ARM else "industrial"
     if name not in DRIVES:
         raise NameUnknownError("class of drives", name, list(DRIVES))
     return name, DRIVES[name]
+
+
+def with_slides(
+    estimates: Mapping[str, Estimate], slides: NDArray[np.bool_], carried: Array
+) -> dict[str, Estimate]:
+    """Return estimates in which slides have numbers by what they carry [kg]: torque says nothing of them."""
+    if not slides.any():
+        return dict(estimates)
+    B = SLIDE_SHARE * carried
+    K = (2 * np.pi * SLIDE_SWING) ** 2 * carried
+    own = {"joint_stiffness": K, "joint_damping": 2 * SLIDE_DAMPING * np.sqrt(K * B), "motor_inertia": B}
+    return {
+        entry: one._replace(value=np.where(slides, own[entry], one.value), why=one.why + SLIDE)
+        for entry, one in estimates.items()
+    }

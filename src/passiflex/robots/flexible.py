@@ -101,6 +101,10 @@ class FlexibleJointRobot:
         """
         return _built(read_description(name))
 
+    def assumed(self, entry: str) -> bool:
+        """Return whether an entry of the robot file is an assumption: its source begins with that word."""
+        return self.sources.get(entry, "").lower().startswith("assumed")
+
     @property
     def n(self) -> int:
         """Return the number of joints."""

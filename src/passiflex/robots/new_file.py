@@ -9,10 +9,11 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+import yaml
 
 from passiflex.robots.bodies import Array
 from passiflex.robots.chain import ReadChain, SerialChain, read_chain
-from passiflex.robots.drives import Drive, Estimate, drive_of
+from passiflex.robots.drives import Drive, Estimate, drive_of, with_slides
 from passiflex.robots.once_over import weights
 from passiflex.robots.robot_entries import UNITS
 
@@ -40,6 +41,7 @@ def new_robot_file(
     frozen: Mapping[str, float] | None = None,
     drive: str | None = None,
     folder: Path | None = None,
+    name: str | None = None,
 ) -> NewFile:
     """Return a commented robot file for an arm of a URDF.
 
@@ -49,6 +51,7 @@ def new_robot_file(
     frozen: Where other joints stand [rad, m].
     drive: Class of the drives, one of `drives.DRIVES`; by the arm's strength if left out.
     folder: In which the file will lie; that of the URDF if left out.
+    name: Of the robot; that of the URDF's file if left out.
 
     Raises
     ------
@@ -59,13 +62,16 @@ def new_robot_file(
     read = read_chain(path, end_effector, base=base, frozen=frozen)
     chain, told = read.chain, ratings(read.chain)
     rating = np.where(np.isnan(told), _needed(chain), told)
-    name, kind = drive_of(drive, rating)
-    estimates = kind.estimates(rating)
+    slides = np.array([joint.kind == "prismatic" for joint in chain.joints])
+    called, kind = drive_of(drive, rating[~slides])
+    carried = np.cumsum([body.mass for body in chain.bodies[::-1]])[::-1]
+    estimates = with_slides(kind.estimates(rating), slides, carried)
     where = path.name if folder is None or folder.resolve() == path.parent.resolve() else str(path.resolve())
-    lines = [*_head(path, read, where), f"torque_sensors: {str(kind.sensed).lower()}"]
-    lines += [*_joint_lines(chain), *_estimated(estimates, name, kind, chain)]
+    lines = [*_head(path, read, where, NUMBERED.sub("_", name or path.stem))]
+    lines += [f"torque_sensors: {str(kind.sensed).lower()}   # assumed, of this class of drives"]
+    lines += [*_joint_lines(chain), *_estimated(estimates, called, kind, chain)]
     lines += _ratings(rating, told, chain)
-    return NewFile("\n".join(lines) + "\n", read, name, estimates)
+    return NewFile("\n".join(lines) + "\n", read, called, estimates)
 
 
 def ratings(chain: SerialChain) -> Array:
@@ -80,11 +86,10 @@ def _needed(chain: SerialChain) -> Array:
     return np.asarray(np.maximum(HEADROOM * heaviest, LEAST_RATING))
 
 
-def _head(path: Path, read: ReadChain, where: str) -> Iterator[str]:
-    name = NUMBERED.sub("_", path.stem)
+def _head(path: Path, read: ReadChain, where: str, name: str) -> Iterator[str]:
     chain, choice = read.chain, read.choice
     yield f"# {name}: written by `passiflex robot new`; what says assumed is an estimate: replace it by what you know."
-    yield f"name: {name}"
+    yield f"name: {_quoted(name)}"
     yield f"description: {chain.n} joints of {path.name}, from {choice.base} to {choice.tip}"
     yield f"urdf: {_quoted(where)}"
     yield f"base: {_quoted(choice.base)}"
@@ -106,7 +111,7 @@ def _joint_lines(chain: SerialChain) -> Iterator[str]:
         unit = "m" if joint.kind == "prismatic" else "rad"
         span = f"{joint.lower:.3g} to {joint.upper:.3g} {unit}"
         most = f"{joint.velocity:.3g} {unit}/s, {joint.effort:.4g} {'N' if unit == 'm' else 'N m'}"
-        yield f"#   {joint.name:{width}}  moves {body.mass:.3g} kg, {span}, {most}"
+        yield f"#   {joint.name:{width}}  a link of {body.mass:.3g} kg, {span}, {most}"
 
 
 def _estimated(
@@ -146,4 +151,5 @@ def _listed(values: Sequence[float] | Array) -> str:
 
 def _quoted(text: str) -> str:
     """Return a text as YAML reads it."""
-    return text if re.fullmatch(r"[A-Za-z_][A-Za-z0-9_./-]*", text) else "'" + text.replace("'", "''") + "'"
+    plain = re.fullmatch(r"[A-Za-z_][A-Za-z0-9_./-]*", text) and yaml.safe_load(text) == text
+    return text if plain else "'" + text.replace("'", "''") + "'"

@@ -19,6 +19,8 @@ ENDLESS = np.pi
 """Half the range [rad, m] of a joint without limits."""
 TIGHT, LAVISH = 1.0, 50.0
 """Shares of its torque limit that a joint's weight may take, and how many times it may be that of all joints."""
+ALIKE, PLACED = 4, 10.0
+"""From how many joints on equal torque limits look like placeholders, where all are so many times the weight's."""
 LIGHTEST, HEAVIEST = 0.2, 500.0
 """[kg] Between which arms weigh."""
 
@@ -114,6 +116,11 @@ def oddities(robot: FlexibleJointRobot, seen: OnceOver) -> Iterator[str]:
     loaded = seen.weight > 1e-3 * seen.weight.max()
     if np.isfinite(limit).all() and (limit[loaded] > LAVISH * seen.weight[loaded]).all():
         yield "all torque limits are many times what the arm weighs: are they the motors' own?"
+    elif len(limit) >= ALIKE and np.ptp(limit) == 0 and (limit > PLACED * seen.weight).all():
+        yield f"all torque limits are {limit[0]:g}, many times what the weight takes: are they placeholders?"
+    for joint, fastest in zip(joints, robot.velocity_limit, strict=True):
+        if fastest == 0:
+            yield f"joint {joint.name!r} has a speed limit of 0: is it a placeholder?"
     if not np.isfinite(limit).any():
         yield "no joint has a torque limit: torques are not judged by it"
     if not LIGHTEST < seen.mass < HEAVIEST:

@@ -26,7 +26,9 @@ class AtPose(Section):
     """The joint angles with the end effector at a pose: of those that are found the ones farthest from singular."""
 
     pose: Pose = Field(description="of the end effector")
-    near: Angles | None = Field(default=None, description="where to begin: the nearest found is taken, rad")
+    near: Angles | None = Field(
+        default=None, description="where to begin: the first found from there is taken, rad"
+    )
 
 
 def _kind(written: Any) -> str:

@@ -71,6 +71,7 @@ class LinearLoop:
         self.law = LawSlope(s, self.at, self.compiled)
         self.remembered, self.x = self.law.remembered, self.law.x
         self._flows: dict[float, tuple[Array, Array]] = {}
+        self._torques: dict[int, tuple[Standing, Array]] = {}
         self._kin: LinearLoop | None = None
 
     def spectrum(
@@ -191,9 +192,13 @@ class LinearLoop:
 
     def heard(self, at: Standing, period: float, elapsed: float, gains: Gains) -> Array:
         """Return what another robot's τ_a adds to the law's derivative by x: it is all that the law sees of a robot."""
-        law = (self._kin or self).law
-        by_torque = law.by(period, elapsed, gains)[:, self._told :]
-        return np.asarray(by_torque @ (law.torque(at) - law.torque(self.at)))
+        by_torque = (self._kin or self).law.by(period, elapsed, gains)[:, self._told :]
+        return np.asarray(by_torque @ (self._torque(at) - self._torque(self.at)))
+
+    def _torque(self, at: Standing) -> Array:
+        if id(at) not in self._torques:
+            self._torques[id(at)] = at, (self._kin or self).law.torque(at)
+        return self._torques[id(at)][1]
 
     def by_plant(self, timing: Timing, left: NDArray[Any], ran: NDArray[Any]) -> NDArray[Any]:
         """Return the derivative of leftᴴ `flow` ran by the entries of [A B] of the plant (m, N, N + n).
