@@ -37,6 +37,7 @@ EXTRA = re.compile(r"passiflex\[(\w+)\]")
 ELLIPSIS = "…"
 
 SMALLER = {
+    "campaign arm3_campaign.yaml --out": "campaign arm3_campaign.yaml --samples 16 --out",
     "--samples 1000": "--samples 20",
     "--evaluations 400": "--evaluations 16",
 }

@@ -43,6 +43,8 @@ REGULAR = 1e-6
 """Regularisation [1/kg] from which a law may start in a singular posture; less only guards round-off."""
 
 
+PLACED = 64
+"""Poses whose angles are remembered."""
 _placed: dict[Hashable, tuple[float, ...]] = {}
 """Robot, tool and pose → the joint angles that were found."""
 
@@ -145,6 +147,8 @@ def _with_angles(scenario: Scenario, robot: FlexibleJointRobot, described: dict[
         scenario.posture,
     )
     if key not in _placed:  # as campaigns ask for the same one a thousand times
+        while len(_placed) >= PLACED:
+            _placed.pop(next(iter(_placed)))
         begin = None if near is None else np.array(near)
         found = posture_at(robot, described, goal, turned=turned, near=begin)
         _placed[key] = tuple(found.tolist())
