@@ -39,9 +39,9 @@ SCENARIO: dict[str, Any] = {
 }
 STRAIGHT = {
     "iiwa14": [[0.0] * 7, [0.3, 0.6, 0, 0, 0, 1.0, 0]],
-    "fr3": [[0, 0.3, 0, -0.1518, 0, 0.5445, 0]],
+    "ur5e": [[0.0] * 6],
     "ur10": [[0, -1.712, 1.712, 0, 0, 0], [0, -1.0, 0, 0.3, 0.8, 0]],
-    "z1": [[0, 1.5, -1.0, -0.54, 0, 0]],
+    "xarm7": [[0.0] * 7],
 }
 """Stretched arms and stretched wrists."""
 
@@ -86,8 +86,8 @@ def test_a_singular_start_is_said_and_survived(robot: str, q: list[float]) -> No
     start = np.clip(q, low, high).tolist()
     one = scenario(robot=robot, posture=start, reference=events)
     lost = lost_directions(resolve(one).law.task, posture(arm, np.array(start), arm.nominal()))
-    said = [line for line in cautions(resolve(one)) if "cannot" in line]
-    assert len(said) == (1 if lost.size else 0)
+    assert lost.shape[1] >= 1
+    assert len([line for line in cautions(resolve(one)) if "cannot" in line]) == 1
     run = simulate(one)
     assert not run.failure
     assert audit(run).verdict == "passive"

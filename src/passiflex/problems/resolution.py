@@ -43,6 +43,8 @@ REGULAR = 1e-6
 """Regularisation [1/kg] from which a law may start in a singular posture; less only guards round-off."""
 
 
+PLACES = 3
+"""Joints that hold a position."""
 PLACED = 64
 """Poses whose angles are remembered."""
 _placed: dict[Hashable, tuple[float, ...]] = {}
@@ -180,15 +182,20 @@ def _refuse_too_few(law: AbstractLaw, at_start: Posture) -> None:
     """Raise ValueRangeError for a pose that has more directions to hold than the robot has joints."""
     held, n = len(law.task.held), law.robot.n
     if law.task.turns and n < held:
-        turns = freest_turns(at_start, min(6 - n, 3))
-        names = " and ".join("xyz"[i] for i in turns)
-        written = ", ".join("0" if i in turns else "30" for i in range(3))
+        way = "task: position"
+        if n >= PLACES:
+            turns = freest_turns(at_start, 6 - n)
+            names = " and ".join("xyz"[i] for i in turns)
+            written = ", ".join("0" if i in turns else "30" for i in range(3))
+            way = (
+                f"rotation: [{written}] in stiffness and damping, so that the end effector is free to turn about its "
+                f"{names}, about which the arm can turn it least at this start; or task: position"
+            )
         raise ValueRangeError(
             f"task 'pose' holds {held} directions, more than robot {law.robot.name!r} can move in",
             got=f"{n} joints",
             needs="at least as many joints as directions that are held",
-            try_=f"rotation: [{written}] in stiffness and damping, so that the end effector is free to turn about its "
-            f"{names}, about which the arm can turn it least at this start; or task: position",
+            try_=way,
         )
 
 

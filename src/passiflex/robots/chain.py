@@ -217,6 +217,12 @@ def read_chain(
         [e for leaving in document.children.values() for e in leaving],
     )
     held = {e.joint.name: frozen_at(e, values) for e in still if not e.fixed and e.joint.name not in own}
+    for edge in still:
+        if (
+            edge.mimics in held and edge.joint.name not in values
+        ):  # a finger goes where the one that it follows is
+            times, more = edge.follows
+            held[edge.joint.name] = times * held[edge.mimics] + more
     for name in values:
         if name not in held:
             raise NameUnknownError("joint that is not the arm's", name, held)

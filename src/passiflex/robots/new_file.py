@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-import yaml
 
 from passiflex.robots.bodies import Array
 from passiflex.robots.chain import ReadChain, SerialChain, read_chain
@@ -21,6 +20,8 @@ HEADROOM = 2.0
 """How many times its weight a joint is taken to bear whose torque rating is not known."""
 LEAST_RATING = 1.0
 """[N m] For joints that carry no weight."""
+NO_TEXT = {"null", "true", "false", "yes", "no", "on", "off", "y", "n"}
+"""Words that YAML takes for something else than text."""
 NUMBERED = re.compile(r"[^A-Za-z0-9_.-]+")
 
 
@@ -151,5 +152,5 @@ def _listed(values: Sequence[float] | Array) -> str:
 
 def _quoted(text: str) -> str:
     """Return a text as YAML reads it."""
-    plain = re.fullmatch(r"[A-Za-z_][A-Za-z0-9_./-]*", text) and yaml.safe_load(text) == text
+    plain = re.fullmatch(r"[A-Za-z_][A-Za-z0-9_./-]*", text) and text.lower() not in NO_TEXT
     return text if plain else "'" + text.replace("'", "''") + "'"

@@ -60,8 +60,8 @@ class Joint(NamedTuple):
 class Edge(NamedTuple):
     """One joint of the document, moving or fixed, with the links it connects.
 
-    `passive` says why it cannot be moved by a motor of its own, `mimics` the joint that it follows, `wrong` what of it
-    cannot be read, which matters only if it is to move.
+    `passive` says why it cannot be moved by a motor of its own, `mimics` the joint that it follows, `follows` by which
+    multiplier and offset, `wrong` what of it cannot be read, which matters only if it is to move.
     """
 
     joint: Joint
@@ -70,6 +70,7 @@ class Edge(NamedTuple):
     fixed: bool
     passive: str = ""
     mimics: str = ""
+    follows: tuple[float, float] = (1.0, 0.0)
     wrong: RobotError | None = None
 
 
@@ -140,15 +141,28 @@ class PartReader:
         leader = element.find("mimic")
         mimics = "" if leader is None else attribute(leader, "joint", where, "mimic")
         passive = f"mimics joint {mimics!r}" if mimics else ""
-        axis, limits, wrong = FIRST, dict(LIMITS), None
+        axis, limits, follows, wrong = FIRST, dict(LIMITS), (1.0, 0.0), None
         try:
+            if leader is not None:
+                says = zip(("multiplier", "offset"), ("1", "0"), strict=True)
+                times, more = (
+                    float(_numbers(leader.get(n, other), 1, f"{where}: {n}")[0]) for n, other in says
+                )
+                follows = times, more
             refuse_unread(element, where, [tag for tag in MOVES if element.find(tag) is None])
             axis = self._axis(element, where)
             limits = self._limits(element, where, continuous=kind == "continuous")
         except RobotError as error:
             wrong = error
         return Edge(
-            Joint(name, moves, xyz, rpy, axis, **limits), parent, child, fixed, passive, mimics, wrong
+            Joint(name, moves, xyz, rpy, axis, **limits),
+            parent,
+            child,
+            fixed,
+            passive,
+            mimics,
+            follows,
+            wrong,
         )
 
     def moving(self, element: ET.Element, joint: Joint) -> None:
