@@ -31,7 +31,7 @@ from passiflex.robots.bodies import (
     triangle_defect,
     turned,
 )
-from passiflex.robots.chain_choice import Choice, Tree, choose, frozen_at, moved, placed
+from passiflex.robots.chain_choice import Choice, Tree, choose, held_still, moved, placed
 from passiflex.robots.urdf import read_document
 from passiflex.robots.urdf_parts import COMPONENTS, LIMITS, UNLIMITED, Edge, Joint, listed
 
@@ -216,13 +216,7 @@ def read_chain(
         {e.joint.name for e in moving},
         [e for leaving in document.children.values() for e in leaving],
     )
-    held = {e.joint.name: frozen_at(e, values) for e in still if not e.fixed and e.joint.name not in own}
-    for edge in still:
-        if (
-            edge.mimics in held and edge.joint.name not in values
-        ):  # a finger goes where the one that it follows is
-            times, more = edge.follows
-            held[edge.joint.name] = times * held[edge.mimics] + more
+    held = held_still([e for e in still if not e.fixed and e.joint.name not in own], values)
     for name in values:
         if name not in held:
             raise NameUnknownError("joint that is not the arm's", name, held)

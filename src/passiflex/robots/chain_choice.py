@@ -219,6 +219,16 @@ def frozen_at(edge: Edge, values: Mapping[str, float]) -> float:
     return float(np.mean(ends))
 
 
+def held_still(edges: Sequence[Edge], values: Mapping[str, float]) -> dict[str, float]:
+    """Return where joints stand that are not of the chain: those that follow another one where that puts them."""
+    held = {edge.joint.name: frozen_at(edge, values) for edge in edges}
+    for edge in edges:
+        if edge.mimics in held and edge.joint.name not in values:
+            times, more = edge.follows
+            held[edge.joint.name] = times * held[edge.mimics] + more
+    return held
+
+
 def moved(joint: Joint, value: float) -> Placement:
     """Return the frame of a joint that stands at a value, in the link that carries it."""
     R = rotation_of(joint.rpy)
