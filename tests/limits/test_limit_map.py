@@ -258,7 +258,7 @@ def test_what_runs_in_continuous_time_needs_a_rate() -> None:
     [
         ({"rate": 0}, "rate; got 0; needs Hz, one number, > 0"),
         ({"rate": "1 m"}, "rate; got '1 m'"),
-        ({"rate": "fast"}, "rate; got 'fast'.*try text with a unit, as '1 kHz'"),
+        ({"rate": "fast"}, "rate; got 'fast'.*try text with its unit, as '1 kHz'"),
         ({"rate": 2e6}, "rate; got 2000000.0"),
         ({"delay": -1}, "delay; got -1; needs s, one number, ≥ 0"),
         ({"delay": float("nan")}, "delay; got nan"),

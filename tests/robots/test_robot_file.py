@@ -153,7 +153,7 @@ def test_a_urdf_in_place_of_a_robot_file_is_said_with_what_to_do(write, tmp_path
     for name in (tmp_path / "two.urdf", "two.urdf", "arm.urdf.xacro", URDF, tmp_path / "wrong.yaml"):
         with pytest.raises(
             RobotError,
-            match=r"is a URDF, which knows nothing of motors .*; try a YAML file with the entries name",
+            match=r"is a URDF, which knows nothing of motors .*; try passiflex robot new .*, which writes one",
         ):
             FlexibleJointRobot.load(name)
 

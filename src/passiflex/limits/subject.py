@@ -78,6 +78,14 @@ def with_task(scenario: Scenario, task: str) -> Scenario:
     return scenario.changed(changes)
 
 
+EXAMPLES = {
+    "1": "a share, as 0.2 or '20 %'",
+    "Hz": "text with its unit, as '1 kHz'",
+    "s": "text with its unit, as '1 ms'",
+}
+"""How numbers of a unit may be written."""
+
+
 def number(name: str, written: float | str, quantity: Quantity) -> float:
     """Return what was written as a number in the quantity's unit.
 
@@ -89,9 +97,7 @@ def number(name: str, written: float | str, quantity: Quantity) -> float:
     try:
         value = quantity.convert(written)
     except ValueError as mistake:
-        try_ = (
-            "a share, as 0.2 or '20 %'" if quantity.unit == "1" else "text with a unit, as '1 kHz' or '1 ms'"
-        )
+        try_ = EXAMPLES.get(quantity.unit, f"a number in {quantity.unit}")
         raise ValueRangeError(name, got=shown(written), needs=quantity.words, try_=try_) from mistake
     assert isinstance(value, float)
     return value

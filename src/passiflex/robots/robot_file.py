@@ -181,12 +181,16 @@ def unreadable(path: Path, error: Exception) -> RobotError:
     return RobotError(f"robot file {str(path)!r} cannot be read", got=error, needs="a YAML file")
 
 
+SHORT = 80
+"""Letters of a path that is repeated."""
+
+
 def a_urdf(name: str) -> RobotError:
     """Return what to say where a URDF is given in place of a robot file."""
     return RobotError(
         f"{shown(name)} is a URDF, which knows nothing of motors and elastic joints",
         needs="a robot file",
-        try_=f"a YAML file with the entries {', '.join(Entries.model_fields)}",
+        try_=f"passiflex robot new {name if len(name) < SHORT else 'ARM.urdf'}, which writes one",
     )
 
 
