@@ -225,7 +225,7 @@ def test_a_card_says_it_all_on_one_page() -> None:
         "so101 at 200 Hz with 1 period of delay",
         "K_x up to ",
         "None: the arm measures no joint torque.",
-        "With its joints as they are: set K_x to ",
+        "With its joints as they are in its file, set K_x to ",
         "Assumed, or not well known: joint_stiffness 0.2 to 5 times, joint_damping",
         "there is no K_x of 10 N/m or more with 24% of critical damping or more",
         "2 √K_x",

@@ -64,14 +64,9 @@ def title(card: Card) -> str:
 
 def _answer(card: Card) -> Block:
     seen, robot, surest, bare = once_over(card.robot), card.robot, card.surest.border, card.bare.border
-    lines = []
+    lines, turning = [], card.task == "pose"
     if bare.stiffness:
-        who = (
-            "Whatever is assumed of its joints"
-            if card.surest.over and surest.stiffness
-            else "With its joints as they are"
-        )
-        lines.append(f"{who}: {_advice(surest if surest.stiffness else bare, turning=card.task == 'pose')}.")
+        lines.append(f"With its joints as they are in its file, {_advice(bare, turning=turning)}.")
         largest = _stiff(bare.stiffness, "translation")
         lines.append(
             f"Without shaping (K_e = K, B_e = B) K_x {largest} holds in translation; limit: {bare.why}."
@@ -81,12 +76,12 @@ def _answer(card: Card) -> Block:
     if card.surest.over:
         ends = [(entry, range_of(robot, entry)) for entry in uncertain(robot)]
         words = ", ".join(f"{entry} {low:.2g} to {high:.2g} times" for entry, (low, high) in ends)
-        borne = (
-            f"On all robots of these ranges that were tried K_x {_stiff(surest.stiffness, 'translation')} holds."
+        sure = (
+            f"To be sure whatever they are, {_advice(surest, turning=turning)}"
             if surest.stiffness
-            else f"For all of these robots there is {NONE}: measure them before you trust the first line."
+            else f"For all of these robots there is {NONE}: measure them before you trust the first line"
         )
-        lines.append(f"Assumed, or not well known: {words}, all joints alike. {borne}")
+        lines.append(f"Assumed, or not well known: {words}, all joints alike. {sure}.")
     lines.append(
         f"{robot.n} joints, {seen.mass:.3g} kg that move, {seen.reach:.3g} m; motors held, its links swing at "
         f"{seen.swing:.3g} Hz and more, and the springs of its joints give way as {card.springs:.3g} N/m does in the "
