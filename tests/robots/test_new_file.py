@@ -13,6 +13,7 @@ import yaml
 
 from cli.shell import Shell
 from passiflex.errors import NameUnknownError, RobotError
+from passiflex.robots.catalogue import read_description
 from passiflex.robots.drives import DRIVES, drive_of
 from passiflex.robots.flexible import FlexibleJointRobot
 from passiflex.robots.new_file import new_robot_file
@@ -26,6 +27,13 @@ PUBLISHED = {
     "Gen3": ([39] * 4 + [9] * 3, [4000] * 4 + [3500] * 3, [0.3] * 4 + [0.18, 0.18, 0.2]),
 }
 """Torque ratings, K and B of arms with torque sensors (sources: `docs/robots.md`; K of the LWR is not public)."""
+
+
+@pytest.fixture(autouse=True)
+def without_what_it_hangs_on(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Leave out what takes seconds, but for the test that is of it."""
+    if "hangs" not in request.node.name:
+        monkeypatch.setattr("passiflex.cli.robot_commands._hang", lambda robot: None)
 
 
 @pytest.mark.parametrize("name", PUBLISHED)
@@ -239,3 +247,19 @@ def test_placeholders_are_noticed() -> None:
     assert "are they placeholders?" in found
     assert f"{arm.arm.chain.joints[0].name!r} has a speed limit of 0" in found
     assert list(oddities(arm, seen)) == []
+
+
+def test_a_new_file_tells_what_the_answer_hangs_on(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    (tmp_path / "arm.urdf").write_text(read_description("so101").chain.to_urdf())
+    monkeypatch.chdir(tmp_path)
+    made = Shell(monkeypatch, capsys)("robot", "new", "arm.urdf")
+    assert made.status == 0, made.err
+    said = re.findall(
+        r"over its range (\w+) changes the lowest rate for 1000 N/m from (\S+) to (\S+) times", made.out
+    )
+    assert sorted(entry for entry, *_ in said) == ["joint_damping", "joint_stiffness", "motor_inertia"]
+    spans = [float(high) / float(low) for _, low, high in said]
+    assert spans == sorted(spans, reverse=True)
+    assert spans[0] > 1.5

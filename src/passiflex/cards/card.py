@@ -157,7 +157,7 @@ def card(
             "delay", got=f"{late:g} s", needs=f"at most {MOST_LATE:g} periods, {MOST_LATE / hertz:g} s"
         )
     told = arm.sensed if sensed is None else sensed
-    task = "pose" if arm.n >= LEAST_POSE else "position"
+    task = _task(arm)
     report(f"{arm.name}: compiling")
     places = workspace_postures(arm, PoseTask() if task == "pose" else PositionTask())
     own = Setting(arm, hertz, late, places, task)
@@ -202,6 +202,24 @@ def card(
         folklore=tuple(folklore(own)),
         command=command,
     )
+
+
+@on_one_thread
+def hangs(robot: FlexibleJointRobot, rate: float = 1000.0, places: int = 2) -> tuple[Hang, ...]:
+    """Return how the lowest rate of an arm hangs on what its file may assume, at few postures and one period late.
+
+    Raises
+    ------
+    PassiflexError
+        For an arm without regular postures.
+    """
+    task = _task(robot)
+    found = workspace_postures(robot, PoseTask() if task == "pose" else PositionTask(), places)
+    return tuple(_hangs(Setting(robot, rate, 1 / rate, found, task)))
+
+
+def _task(robot: FlexibleJointRobot) -> str:
+    return "pose" if robot.n >= LEAST_POSE else "position"
 
 
 def _rows(setting: Setting, *, shaped: bool, told: bool, report: Report) -> list[Row]:

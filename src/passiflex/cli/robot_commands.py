@@ -79,12 +79,30 @@ def new(
     for doubt in doubts(read_description(target)):
         console.print(f"looks wrong: {doubt}")
     _print(robot)
+    _hang(robot)
     console.print(
         f"assumed, for {made.drive} drives{'' if drive else ', which is a guess: --drive says which they are'}: "
-        f"joint_stiffness, joint_damping, motor_inertia, torque sensors; which of them the answer hangs on: "
+        f"joint_stiffness, joint_damping, motor_inertia, torque sensors; which gains are safe: "
         f"passiflex card {target} --rate '1 kHz' --delay '1 ms'"
     )
     return 0
+
+
+def _hang(robot: FlexibleJointRobot) -> None:
+    """Print what of the file the answer hangs on most, where it can be told."""
+    from passiflex.cards.card import hangs
+    from passiflex.cards.folklore import USUAL
+    from passiflex.errors import PassiflexError
+
+    try:
+        found = hangs(robot)
+    except PassiflexError:
+        return
+    for hang in sorted(found, key=lambda h: -max(h.rates) / min(h.rates)):
+        low, high = min(hang.rates), max(hang.rates)
+        console.print(
+            f"over its range {hang.entry} changes the lowest rate for {USUAL:g} N/m from {low:.2g} to {high:.2g} times"
+        )
 
 
 def _pairs(written: tuple[str, ...]) -> dict[str, str]:
