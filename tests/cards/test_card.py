@@ -104,7 +104,7 @@ def test_the_slowest_clock_and_the_longest_delay_are_borders() -> None:
     known, rate, delay = slowest_clock(s, k, search=False), slowest_clock(s, k), longest_delay(s, k)
     assert known <= rate < RATE
     assert delay > DELAY
-    gains = [s.gains(k, 30.0, scales) for scales in SCALES]
+    gains = [s.gains(*stiffness_of("translation", k), scales) for scales in SCALES]
     assert any(s.holds(g, 1 / known, 1 / known) for g in gains)
     assert not any(s.holds(g, 1 / (0.9 * known), 1 / (0.9 * known)) for g in gains)
     for faster in np.geomspace(1.01 * rate, 5000, 12):  # what holds at the border holds on this side of it

@@ -87,8 +87,11 @@ class Border(NamedTuple):
 
 
 def stiffness_of(part: str, value: float) -> tuple[float, float]:
-    """Return K_x of translation and rotation, one of them as given and the other one as usual."""
-    return (value, ROTATION) if part == "translation" else (TRANSLATION, value)
+    """Return K_x of translation and rotation, one of them as given and the other one as usual, or softer with it."""
+    lever = ROTATION / TRANSLATION
+    if part == "translation":
+        return value, min(ROTATION, lever * value)
+    return min(TRANSLATION, value / lever), value
 
 
 def border(setting: Setting | Spread, part: str, *, thorough: bool = True, most: float = math.inf) -> Border:

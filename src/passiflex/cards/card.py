@@ -69,12 +69,12 @@ class Clock(NamedTuple):
 
 
 class Hang(NamedTuple):
-    """An entry of the robot file at both ends of its range, and by how much the lowest rate for a usual K_x changes."""
+    """An entry of the robot file at both ends of its range: how the lowest rate changes, and how well it is known."""
 
     entry: str
     shares: tuple[float, float]
     rates: tuple[float, float]
-    assumed: bool
+    known: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -288,4 +288,5 @@ def _hangs(own: Setting) -> Iterator[Hang]:
     for entry in ENTRIES if math.isfinite(middle) else ():
         ends = range_of(own.robot, entry)
         low, high = (slowest_clock(at_shares(own, {entry: e}), USUAL, search=False) / middle for e in ends)
-        yield Hang(entry, ends, (low, high), own.robot.assumed(entry))
+        sourced = "in a range" if entry in own.robot.ranges else "from a source"
+        yield Hang(entry, ends, (low, high), "assumed" if own.robot.assumed(entry) else sourced)

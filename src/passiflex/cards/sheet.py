@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from passiflex.cards.border import BEGUN, Border
+from passiflex.cards.border import BEGUN, Border, stiffness_of
 from passiflex.cards.card import NOISE, Card, Row
 from passiflex.cards.folklore import FOLKLORE, USUAL, Told
 from passiflex.cards.setting import MARGIN, NEAREST, RATIO, ROTATION, SCALES, TOOL_CENTRE, TRANSLATION
@@ -93,7 +93,8 @@ def _answer(card: Card) -> Block:
 def _advice(b: Border, *, turning: bool) -> str:
     """Return gains with room to all sides."""
     k, d = _stiff(b.stiffness / 2, b.part).removeprefix("up to "), b.damping
-    rotation = f", rotation at {ROTATION:g} N m/rad with {d.beside:.3g} N m s/rad" if turning else ""
+    turn = stiffness_of(b.part, b.stiffness / 2)[1]
+    rotation = f", rotation at {turn:.2g} N m/rad with {d.beside:.3g} N m s/rad" if turning else ""
     return f"set K_x to {k} or less with D_x from {d.least:.3g} to {d.most:.3g} N s/m at that{rotation}"
 
 
@@ -114,8 +115,10 @@ def _stiffness(card: Card) -> Block:
 def _dampings(*, turning: bool) -> str:
     if not turning:
         return "D_x in N s/m."
-    other = f"the other K_x is {ROTATION:g} N m/rad, or {TRANSLATION:g} N/m"
-    return f"D_x of translation in N s/m; of rotation in N m s/rad; {other}."
+    return (
+        f"D_x of translation in N s/m; of rotation in N m s/rad. The other K_x is {ROTATION:g} N m/rad or "
+        f"{TRANSLATION:g} N/m; where this one is below its own of the two, in their ratio."
+    )
 
 
 def _row(row: Row, *, turning: bool) -> tuple[str, ...]:
@@ -207,7 +210,7 @@ def _hangs(card: Card) -> Block:
     rows = tuple(
         (
             h.entry,
-            "assumed" if h.assumed else "from a source",
+            h.known,
             f"{h.shares[0]:.2g} to {h.shares[1]:.2g} times",
             f"{h.rates[0]:.2g} to {h.rates[1]:.2g} times",
         )
