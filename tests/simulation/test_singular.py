@@ -39,9 +39,7 @@ SCENARIO: dict[str, Any] = {
 }
 STRAIGHT = {
     "iiwa14": [[0.0] * 7, [0.3, 0.6, 0, 0, 0, 1.0, 0]],
-    "ur5e": [[0.0] * 6],
     "ur10": [[0, -1.712, 1.712, 0, 0, 0], [0, -1.0, 0, 0.3, 0.8, 0]],
-    "xarm7": [[0.0] * 7],
 }
 """Stretched arms and stretched wrists."""
 

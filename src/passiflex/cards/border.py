@@ -109,13 +109,17 @@ def border(setting: Setting | Spread, part: str, *, thorough: bool = True, most:
 
     begun, cap = next((k for k in BEGUN[part] if holds(k)), 0.0), min(most, setting.stiffest[part])
     k = _largest(holds, min(begun, cap), cap) if begun else 0.0
-    for lowering in range(1, 1 + LOWERINGS if k else 1):
+    scales, window, softest = None, NO_WINDOW, BEGUN[part][-1]
+    for lowering in range(1, 1 + LOWERINGS):
+        if k < softest:
+            break
         scales = searched(setting, part, k, thorough=thorough)
-        if scales is not None and (window := damping_window(setting, part, k / 2)) is not NO_WINDOW:
+        window = NO_WINDOW if scales is None else damping_window(setting, part, k / 2)
+        if window is not NO_WINDOW:
             break
         k *= LOWERED**lowering
-    else:  # what no search has passed is not called safe
-        return Border(part, 0.0, NOWHERE, NO_WINDOW, *_failing(setting, part, BEGUN[part][-1], SCALES[0]))
+    if scales is None or window is NO_WINDOW:  # what no search has passed is not called safe
+        return Border(part, 0.0, NOWHERE, NO_WINDOW, *_failing(setting, part, softest, SCALES[0]))
     gains = _gains(setting, part, k, scales)
     there = float(gains["damping"][0, 0]), float(gains["damping"][-1, -1])
     if k >= cap:
