@@ -61,11 +61,12 @@ class Slow(NamedTuple):
 
 
 class Clock(NamedTuple):
-    """The lowest rate [Hz] and the longest delay [s] for a stiffness [N/m]."""
+    """The lowest rate [Hz] and the longest delay [s] for a stiffness [N/m], with a tool [kg] or none."""
 
     stiffness: float
     rate: float
     delay: float
+    tool: float = 0.0
 
 
 class Hang(NamedTuple):
@@ -88,7 +89,7 @@ class Card:
     postures: (p, n) rad.
     rows: Largest K_x and its damping, by tool and shaping.
     slow: The same at the rates of other interfaces, for an arm without torque sensors.
-    clocks: Without shaping, bare flange.
+    clocks: Without shaping, bare flange and with the heaviest tool.
     springs: What the joint springs alone are at the end effector [N/m].
     shaping: What was found of B_e on the bare flange; None where the arm cannot shape.
     why_not: Why there is no shaping; empty if there is.
@@ -169,9 +170,11 @@ def card(
     else:
         rows += _rows(shaped, shaped=True, told=told, report=report)
     report(f"{arm.name}: clocks")
-    whole = not told  # there is time for it
+    heavy = dataclasses.replace(own, tool=TOOLS[-1], _members=list(own.members))
+    ways = ((own, not told), (heavy, False))  # where nothing is shaped there is time for all postures
     clocks = tuple(
-        Clock(k, slowest_clock(own, k, thorough=whole), longest_delay(own, k, thorough=whole))
+        Clock(k, slowest_clock(way, k, thorough=whole), longest_delay(way, k, thorough=whole), way.tool)
+        for way, whole in ways
         for k in STIFFNESSES
     )
     report(f"{arm.name}: what it hangs on")

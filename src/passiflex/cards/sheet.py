@@ -166,6 +166,7 @@ def _clocks(card: Card) -> Block:
     rows = tuple(
         (
             f"{c.stiffness:g} N/m",
+            f"{c.tool:g} kg" if c.tool else "none",
             _rate(c.rate),
             "none" if math.isnan(c.delay) else f"{math.floor(1e4 * c.delay) / 10:g} ms",
         )
@@ -174,8 +175,8 @@ def _clocks(card: Card) -> Block:
     periods = delay_words(card.delay * card.rate)
     return Block(
         "Lowest rate and longest delay",
-        ("Joints as they are, no tool.",),
-        Table(("K_x", f"lowest rate, {periods}", f"longest delay at {hertz(card.rate)}"), rows),
+        ("Joints as they are.",),
+        Table(("K_x", "tool", f"lowest rate, {periods}", f"longest delay at {hertz(card.rate)}"), rows),
     )
 
 
@@ -246,12 +247,13 @@ def _made(card: Card) -> Block:
 
 
 def _how(card: Card, task: str) -> Iterator[str]:
-    few = f"; with tools, for other rates and delays: at the {NEAREST} postures nearest to the limit"
+    few = "with tools, for other rates and delays" if card.sensed else "for rates and delays with a tool"
     yield (
         f"Safe: the sampled loop is stable at {len(card.postures)} postures over the workspace on every robot that was "
         f"tried of a box: B, K, D and the links' inertia of each joint off by {100 * MARGIN:g} %, the delay by "
         f"{MARGIN:g} periods, joints up to {NEAR:g} rad beside. A search goes uphill in it, for what does not die out "
-        f"at {SETTLING:g} 1/s or faster{few if card.sensed else ''}; for the ends of D_x at the {NEAREST} nearest."
+        f"at {SETTLING:g} 1/s or faster; in range, {few} and for the ends of D_x at the {NEAREST} postures nearest to "
+        "the limit."
     )
     yield (
         f"Task: {task}. Velocities are differences of readings. D_x in steps of √2, and less than {LEAST_RATIO:.0%} of "
