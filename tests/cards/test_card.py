@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 import passiflex as pf
 from cli.shell import Shell
@@ -33,6 +34,7 @@ from passiflex.errors import NameUnknownError, PassiflexError
 from passiflex.limits.confirmation import disturbed, growth
 from passiflex.limits.margin_box import Member
 from passiflex.limits.workspace import workspace_postures
+from passiflex.plotting.card import draw_page
 from passiflex.reports.card_page import card_html, card_text, write_card
 from passiflex.robots.flexible import FlexibleJointRobot
 
@@ -252,6 +254,23 @@ def test_a_page_needs_nothing_beside_it(tmp_path: Path) -> None:
         assert write_card(found(), tmp_path / f"c{form}").read_bytes().startswith(begins)
     with pytest.raises(NameUnknownError, match=r"ending of a card; got '\.doc'"):
         write_card(found(), tmp_path / "c.doc")
+
+
+def test_the_page_of_paper_holds_all_of_its_text_and_the_picture_beside_it() -> None:
+    """Of the longest lines that there are, too."""
+    text = card_text(found())
+    for page in (text, text + "x" * 160 + "\n" + 30 * "a line\n"):
+        figure = draw_page(found(), page)
+        canvas = FigureCanvasAgg(figure)
+        canvas.draw()
+        words, picture = figure.texts[0].get_window_extent(), figure.axes[0].get_tightbbox()
+        width, height = figure.get_size_inches() * figure.dpi
+        assert words.x0 >= 0
+        assert words.x1 <= width
+        assert words.y0 >= picture.y1
+        assert picture.y0 >= 0
+        assert picture.x1 <= width
+        assert words.y1 <= height
 
 
 def test_the_command_prints_the_card_and_writes_its_forms(

@@ -84,7 +84,7 @@ def _answer(card: Card) -> Block:
         lines.append(f"Assumed, or not well known: {words}, all joints alike. {sure}.")
     lines.append(
         f"{robot.n} joints, {seen.mass:.3g} kg that move, {seen.reach:.3g} m; motors held, its links swing at "
-        f"{seen.swing:.3g} Hz and more, and the springs of its joints give way as {card.springs:.3g} N/m does in the "
+        f"{seen.swing:.3g} Hz and more, and the springs of its joints give way as {_short(card.springs)} N/m does in the "
         "softest direction, on average over the postures: no gain makes that stiffer, and none is looked for."
     )
     return Block("Answer", tuple(lines))
@@ -95,7 +95,9 @@ def _advice(b: Border, *, turning: bool) -> str:
     k, d = _stiff(b.stiffness / 2, b.part).removeprefix("up to "), b.damping
     turn = stiffness_of(b.part, b.stiffness / 2)[1]
     rotation = f", rotation at {turn:.2g} N m/rad with {d.beside:.3g} N m s/rad" if turning else ""
-    return f"set K_x to {k} or less with D_x from {d.least:.3g} to {d.most:.3g} N s/m at that{rotation}"
+    return (
+        f"set K_x to {k} or less with D_x from {_short(d.least)} to {_short(d.most)} N s/m at that{rotation}"
+    )
 
 
 def summary(card: Card) -> tuple[str, str, str]:
@@ -140,6 +142,11 @@ def _damped(b: Border, *, turning: bool) -> tuple[str, str]:
         return push, half
     beside = f"{b.damping.beside:.3g}"
     return f"{push}; {turn}", f"{half}; {beside}" if b.part == "translation" else f"{beside}; {half}"
+
+
+def _short(value: float) -> str:
+    """Return three digits of a number, without an exponent."""
+    return f"{float(f'{value:.3g}'):g}"
 
 
 def _stiff(value: float, part: str) -> str:

@@ -20,7 +20,7 @@ A4 = (8.27, 11.69)
 """[in]"""
 MARGIN, LARGEST, SMALLEST_PICTURE = 0.05, 7.5, 0.16
 """Share of the page around the text; size of the letters at most [pt]; share of the page left for the picture."""
-WIDE, HIGH = 0.603, 1.2
+WIDE, HIGH = 0.63, 1.26
 """Width of a letter and height of a line, in sizes of the letters."""
 
 
@@ -54,7 +54,7 @@ def draw_card(card: Card) -> Figure:
 
 
 def draw_page(card: Card, text: str) -> Figure:
-    """Return the card on a page: its text, and the picture in the corner."""
+    """Return the card on a page: its text, and the picture below it."""
     figure = Figure(figsize=A4)
     lines, room = text.rstrip("\n").split("\n"), 1 - 2 * MARGIN
     by_width = room * A4[0] * 72 / (WIDE * max(map(len, lines)))
