@@ -84,8 +84,8 @@ def _answer(card: Card) -> Block:
         lines.append(f"Assumed, or not well known: {words}, all joints alike. {sure}.")
     lines.append(
         f"{robot.n} joints, {seen.mass:.3g} kg that move, {seen.reach:.3g} m; motors held, its links swing at "
-        f"{seen.swing:.3g} Hz and more, and the springs of its joints give way as {_short(card.springs)} N/m does in the "
-        "softest direction, on average over the postures: no gain makes that stiffer, and none is looked for."
+        f"{seen.swing:.3g} Hz and more, and the springs of its joints give way as {_short(card.springs)} N/m does in "
+        "the softest direction, on average over the postures: no gain makes that stiffer, and none is looked for."
     )
     return Block("Answer", tuple(lines))
 
@@ -134,13 +134,10 @@ def _damped(b: Border, *, turning: bool) -> tuple[str, str]:
     """Return D_x with the largest K_x, and at half of it."""
     if math.isnan(b.damping.least):
         return "–", "–"
-    (push, turn), half = (
-        (f"{value:.3g}" for value in b.there),
-        f"{b.damping.least:.3g} to {b.damping.most:.3g}",
-    )
+    push, turn, least, most, beside = map(_short, (*b.there, *b.damping))
+    half = f"{least} to {most}"
     if not turning:
         return push, half
-    beside = f"{b.damping.beside:.3g}"
     return f"{push}; {turn}", f"{half}; {beside}" if b.part == "translation" else f"{beside}; {half}"
 
 
