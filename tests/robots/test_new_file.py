@@ -237,16 +237,22 @@ def test_a_slide_has_numbers_by_what_it_carries(tmp_path: Path) -> None:
     assert "slides: 20 Hz" in made.text.replace("\n    ", " ")
 
 
-def test_placeholders_are_noticed() -> None:
+def test_placeholders_are_noticed(tmp_path: Path) -> None:
+    """Torque limits that are all the same and far off; a speed of 0, which means none, as it stands in a URDF."""
     arm = FlexibleJointRobot.load("ur5e")
     seen = once_over(arm)
-    speeds = np.where(np.arange(6) == 0, 0.0, arm.velocity_limit)
-    alike = np.full(6, 11 * seen.weight.max())
-    found = " ".join(oddities(dataclasses.replace(arm, torque_limit=alike, velocity_limit=speeds), seen))
-    assert "all torque limits are" in found
-    assert "are they placeholders?" in found
-    assert f"{arm.arm.chain.joints[0].name!r} has a speed limit of 0" in found
+    alike = dataclasses.replace(arm, torque_limit=np.full(6, 11 * seen.weight.max()))
+    assert "are they placeholders?" in " ".join(oddities(alike, seen))
     assert list(oddities(arm, seen)) == []
+    text = arm.arm.chain.to_urdf()
+    first = re.search(r'velocity="[^"]+"', text)
+    assert first is not None
+    (tmp_path / "arm.urdf").write_text(text.replace(first.group(), 'velocity="0"', 1))
+    (tmp_path / "arm.yaml").write_text(new_robot_file(tmp_path / "arm.urdf").text)
+    robot = FlexibleJointRobot.load(tmp_path / "arm.yaml")
+    assert np.isinf(robot.velocity_limit[0])
+    name = robot.arm.chain.joints[0].name
+    assert f"joint {name!r} has a speed limit of 0 in its URDF" in " ".join(oddities(robot, once_over(robot)))
 
 
 def test_a_new_file_tells_what_the_answer_hangs_on(

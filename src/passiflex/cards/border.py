@@ -156,17 +156,17 @@ def damping_window(setting: Setting | Spread, part: str, k: float) -> Window:
     """Return the least and the largest D_x that holds at a K_x, a little inside of what a search has passed."""
     pair, row = stiffness_of(part, k), 0 if part == "translation" else -1
 
-    def gains(scales: Scales, share: float) -> Gains:
+    def gains(scales: Scales, way: int, share: float) -> Gains:
         push, turn = scales
-        return setting.gains(*pair, (share * push, turn) if part == "translation" else (push, share * turn))
+        times = share**way
+        return setting.gains(*pair, (times * push, turn) if part == "translation" else (push, times * turn))
 
     for scales in SCALES:
-        if not setting.holds(gains(scales, 1.0)):
+        if not setting.holds(gains(scales, 1, 1.0)):
             continue
-        up = _searched_end(setting, partial(gains, scales))
-        down = _searched_end(setting, lambda share, s=scales: gains(s, 1 / share))  # type: ignore[misc]
+        up, down = (_searched_end(setting, partial(gains, scales, way)) for way in (1, -1))
         if up and down:
-            found = np.diag(gains(scales, 1.0)["damping"])
+            found = np.diag(gains(scales, 1, 1.0)["damping"])
             return Window(found[row] / down, found[row] * up, float(found[-1 - row]))
     return NO_WINDOW
 

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from passiflex.cards.border import Border, border, borne, longest_delay, searched, slowest_clock
+from passiflex.cards.border import LATEST, Border, border, borne, longest_delay, searched, slowest_clock
 from passiflex.cards.folklore import USUAL, Told, folklore
 from passiflex.cards.setting import MARGIN, ROTATION, Setting
 from passiflex.cards.spread import ENTRIES, Spread, at_shares, range_of
@@ -32,8 +32,6 @@ TOOLS = (0.5, 1.0, 2.0)
 """[kg] Masses on the flange beside none."""
 STIFFNESSES = (200.0, 500.0, 1000.0, 3000.0)
 """[N/m] For which the slowest clock and the longest delay are looked for."""
-MOST_LATE = 18.0
-"""Periods of delay at most."""
 SLOW = (100.0, 125.0, 200.0, 500.0)
 """[Hz] Rates at which arms without torque sensors are commanded."""
 RAISED, MOST_RAISED = 1.15, 16.0
@@ -153,9 +151,9 @@ def card(
     arm = robot if isinstance(robot, FlexibleJointRobot) else FlexibleJointRobot.load(robot)
     hertz = number("rate", rate, RATE)
     late = 1 / hertz if delay is None else number("delay", delay, DELAY)
-    if late * hertz > MOST_LATE:
+    if late * hertz > LATEST:
         raise ValueRangeError(
-            "delay", got=f"{late:g} s", needs=f"at most {MOST_LATE:g} periods, {MOST_LATE / hertz:g} s"
+            "delay", got=f"{late:g} s", needs=f"at most {LATEST:g} periods, {LATEST / hertz:g} s"
         )
     told = arm.sensed if sensed is None else sensed
     task = _task(arm)
@@ -178,7 +176,7 @@ def card(
         for k in STIFFNESSES
     )
     report(f"{arm.name}: what it hangs on")
-    hangs = tuple(_hangs(own))
+    hanging = tuple(_hangs(own))
     report(f"{arm.name}: folklore")
     if isinstance(robot, FlexibleJointRobot):
         command = f"pf.card of {arm.name!r} as it is in memory, at {hertz:g} Hz with {1e3 * late:g} ms"
@@ -201,7 +199,7 @@ def card(
         shaping=shaping,
         why_not=why,
         inertia=None if shaped is None else shaped.inertia,
-        hangs=hangs,
+        hangs=hanging,
         folklore=tuple(folklore(own)),
         command=command,
     )
@@ -236,6 +234,8 @@ def _rows(setting: Setting, *, shaped: bool, told: bool, report: Report) -> list
     if len(spread.settings) > 1 and not shaped:
         report(f"{setting.robot.name}: largest K_x over what is assumed")
         over = border(spread, bare.part, thorough=False, most=bare.stiffness) if bare.stiffness else bare
+        if over.stiffness == bare.stiffness:  # it is the robot as its file has it that decides
+            over = over._replace(mode=bare.mode, joint=bare.joint, posture=bare.posture)
         out.append(Row(0.0, shaped, over, over=True))
     for mass in TOOLS:
         report(f"{setting.robot.name}: largest K_x with {mass:g} kg, {way}")

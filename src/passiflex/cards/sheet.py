@@ -222,7 +222,11 @@ def _hangs(card: Card) -> Block:
         for h in card.hangs
     )
     columns = ("number", "known", "looked at", f"lowest rate for {USUAL:g} N/m")
-    return Block("What the answer hangs on", (), Table(columns, rows))
+    return Block(
+        "What the answer hangs on",
+        ("Of the robots that have mostly decided, without a search.",),
+        Table(columns, rows),
+    )
 
 
 def _folklore(card: Card) -> Block:

@@ -68,7 +68,7 @@ class Spread:
     """Settings that the same gains are to hold for; the first one is the robot as its file has it."""
 
     settings: list[Setting]
-    _last: list[Setting | None] = field(default_factory=lambda: [None])
+    _asked: list[Setting] = field(default_factory=list)
 
     @classmethod
     def over(cls, setting: Setting) -> Spread:
@@ -100,9 +100,10 @@ class Spread:
         self, gains: Mapping[str, Array], period: float | None = None, delay: float | None = None
     ) -> bool:
         """Return whether all hold, as those of `Setting`; the one that failed last is asked first."""
-        for setting in sorted(self.settings, key=lambda s: s is not self._last[0]):
+        self._asked[:] = self._asked or self.settings
+        for i, setting in enumerate(self._asked):
             if not setting.holds(gains, period, delay):
-                self._last[0] = setting
+                self._asked.insert(0, self._asked.pop(i))
                 return False
         return True
 

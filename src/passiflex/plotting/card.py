@@ -20,6 +20,8 @@ A4 = (8.27, 11.69)
 """[in]"""
 MARGIN, LARGEST, SMALLEST_PICTURE = 0.05, 7.5, 0.16
 """Share of the page around the text; size of the letters at most [pt]; share of the page left for the picture."""
+TITLE, BENEATH, LARGEST_PICTURE, WIDTH = 0.035, 0.06, 0.25, 0.4
+"""Shares of the page: above the picture for its title, beneath it for its numbers; its height at most, its width."""
 WIDE, HIGH = 0.63, 1.26
 """Width of a letter and height of a line, in sizes of the letters."""
 
@@ -62,6 +64,7 @@ def draw_page(card: Card, text: str) -> Figure:
     size = min(LARGEST, by_width, by_height)
     figure.text(MARGIN, 1 - MARGIN, "\n".join(lines), family="monospace", fontsize=size, va="top")
     below = 1 - MARGIN - HIGH * len(lines) * size / 72 / A4[1]
-    height = min(below - 2 * MARGIN, 0.25)
-    draw_posture(figure.add_axes((1 - MARGIN - 0.4, below - MARGIN / 2 - height, 0.4, height)), card)
+    top = below - TITLE
+    height = min(top - BENEATH, LARGEST_PICTURE)
+    draw_posture(figure.add_axes((1 - MARGIN - WIDTH, top - height, WIDTH, height)), card)
     return figure

@@ -100,7 +100,11 @@ DRIVES: Mapping[str, Drive] = {
 SLIDE_SWING, SLIDE_SHARE, SLIDE_DAMPING = 20.0, 1.0, 0.02
 """Of a slide: how fast its belt or screw swings with what it carries [Hz], what its motor weighs behind the gear as a
 share of that, and its share of critical damping."""
-SLIDE = "; slides: 20 Hz with what they carry, a motor as heavy as that, 0.02 of critical, of no neighbour"
+SLIDE = (
+    f"; slides: {SLIDE_SWING:g} Hz with what they carry, a motor of {SLIDE_SHARE:g} times that, {SLIDE_DAMPING:g} of "
+    "critical, of no neighbour"
+)
+"""The same in words."""
 WEAKEST_ARM = 15.0
 """[N m] An arm whose strongest joint is weaker is taken for one of servos, any other for one without torque sensors."""
 

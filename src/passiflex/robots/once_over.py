@@ -119,8 +119,8 @@ def oddities(robot: FlexibleJointRobot, seen: OnceOver) -> Iterator[str]:
     elif len(limit) >= ALIKE and np.ptp(limit) == 0 and (limit > PLACED * seen.weight).all():
         yield f"all torque limits are {limit[0]:g}, many times what the weight takes: are they placeholders?"
     for joint, fastest in zip(joints, robot.velocity_limit, strict=True):
-        if fastest == 0:
-            yield f"joint {joint.name!r} has a speed limit of 0: is it a placeholder?"
+        if joint.velocity == 0 and np.isinf(fastest):
+            yield f"joint {joint.name!r} has a speed limit of 0 in its URDF, which is taken for none"
     if not np.isfinite(limit).any():
         yield "no joint has a torque limit: torques are not judged by it"
     if not LIGHTEST < seen.mass < HEAVIEST:

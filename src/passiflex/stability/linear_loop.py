@@ -71,7 +71,6 @@ class LinearLoop:
         self.law = LawSlope(s, self.at, self.compiled)
         self.remembered, self.x = self.law.remembered, self.law.x
         self._flows: dict[float, tuple[Array, Array]] = {}
-        self._torques: dict[int, tuple[Standing, Array]] = {}
         self._kin: LinearLoop | None = None
 
     def spectrum(
@@ -192,13 +191,16 @@ class LinearLoop:
 
     def heard(self, at: Standing, period: float, elapsed: float, gains: Gains) -> Array:
         """Return what another robot's τ_a adds to the law's derivative by x: it is all that the law sees of a robot."""
-        by_torque = (self._kin or self).law.by(period, elapsed, gains)[:, self._told :]
-        return np.asarray(by_torque @ (self._torque(at) - self._torque(self.at)))
+        return self._heard((self._kin or self).law.torque(at) - self._torque, period, elapsed, gains)
 
-    def _torque(self, at: Standing) -> Array:
-        if id(at) not in self._torques:
-            self._torques[id(at)] = at, (self._kin or self).law.torque(at)
-        return self._torques[id(at)][1]
+    def _heard(self, torque: Array, period: float, elapsed: float, gains: Gains) -> Array:
+        by_torque = (self._kin or self).law.by(period, elapsed, gains)[:, self._told :]
+        return np.asarray(by_torque @ torque)
+
+    @cached_property
+    def _torque(self) -> Array:
+        """Return ∂τ_a/∂x of this robot, as the law hears it."""
+        return (self._kin or self).law.torque(self.at)
 
     def by_plant(self, timing: Timing, left: NDArray[Any], ran: NDArray[Any]) -> NDArray[Any]:
         """Return the derivative of leftᴴ `flow` ran by the entries of [A B] of the plant (m, N, N + n).
@@ -285,7 +287,7 @@ class LinearLoop:
         found = (kin or self).law.by(period, elapsed, gains)
         if kin is not None:
             found = found.copy()
-            found[:, : self.x.size] += kin.heard(self.at, period, elapsed, gains)
+            found[:, : self.x.size] += kin._heard(self._torque - kin._torque, period, elapsed, gains)
         return found if noise else found[:, : self._told]
 
 
