@@ -17,6 +17,7 @@ extensions = [
     "mathml",
     "scenario_tables",
     "measures_table",
+    "robots_table",
     "docstrings",
     "made_figures",
     "example_cells",

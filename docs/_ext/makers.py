@@ -2,31 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
+    from passiflex.robots.robot_entries import Commanded
     from passiflex.simulation import Run
 
 LARGEST = 3_000_000
 """A report that is sent to a colleague has no more bytes than this."""
-CARDS = {
-    "iiwa14": ("1 kHz", "1 ms", "FRI, torque overlay"),
-    "iiwa7": ("1 kHz", "1 ms", "FRI, torque overlay"),
-    "fr3": ("1 kHz", "1 ms", "FCI"),
-    "panda": ("1 kHz", "1 ms", "FCI"),
-    "gen3": ("1 kHz", "1 ms", "low-level API"),
-    "ur5e": ("500 Hz", "2 ms", "RTDE"),
-    "ur10": ("125 Hz", "8 ms", "RTDE of the CB3"),
-    "xarm7": ("250 Hz", "4 ms", "servo mode"),
-    "z1": ("500 Hz", "2 ms", "SDK"),
-    "openarm": ("500 Hz", "2 ms", "CAN bus of its motors"),
-    "so101": ("200 Hz", "5 ms", "serial bus of its servos"),
-}
-"""Robots of the catalogue whose cards are made: rate, delay, and what commands them at that rate."""
 
 
 class Group(NamedTuple):
@@ -103,7 +90,7 @@ def uncertainty(folder: Path) -> None:
 def cards(folder: Path) -> None:
     """Make the card of each arm, side by side on all cores, and the table that links to them."""
     with ProcessPoolExecutor(mp_context=get_context("spawn")) as pool:
-        made = [pool.submit(one_card, name, folder) for name in CARDS]
+        made = [pool.submit(one_card, name, by, folder) for name, by in commanded()]
         rows = [row.result() for row in made]
     columns = (
         "arm",
@@ -118,16 +105,25 @@ def cards(folder: Path) -> None:
     )
 
 
-def one_card(name: str, folder: Path) -> tuple[str, ...]:
-    """Make the card of an arm, and return its row of the table."""
+def commanded() -> Iterator[tuple[str, Commanded]]:
+    """Yield the robots of the catalogue that something commands, and what does."""
+    from passiflex.robots.catalogue import catalogue, read_description
+
+    for name in catalogue():
+        if (by := read_description(name).commanded) is not None:
+            yield name, by
+
+
+def one_card(name: str, by: Commanded, folder: Path) -> tuple[str, ...]:
+    """Make the card of an arm, one period late, and return its row of the table."""
     import passiflex as pf
     from passiflex.cards.sheet import summary
     from passiflex.reports.card_page import write_card
+    from passiflex.stability.clock_words import hertz
 
-    rate, delay, interface = CARDS[name]
-    card = pf.card(name, rate, delay)
+    card = pf.card(name, by.rate)
     write_card(card, folder / f"card_{name}.html")
-    return f"{{report}}`{name} <card_{name}>`", f"{interface}, {rate}", *summary(card)
+    return f"{{report}}`{name} <card_{name}>`", f"{by.by}, {hertz(by.rate)}", *summary(card)
 
 
 def picture(target: Path, run: Run, baseline: Run | None = None, until: float | None = None) -> None:
@@ -166,5 +162,5 @@ GROUPS = (
     ),
     Group(("limits.png",), limits),
     Group(("uncertainty.png",), uncertainty),
-    Group(("cards.md", *(f"card_{name}.html" for name in CARDS)), cards),
+    Group(("cards.md", *(f"card_{name}.html" for name, _ in commanded())), cards),
 )

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from passiflex.errors import NameUnknownError, PassiflexWarning, RobotError
 from passiflex.robots.chain import SerialChain, read_chain
 from passiflex.robots.doubts import doubts
-from passiflex.robots.robot_entries import UNITS
+from passiflex.robots.robot_entries import UNITS, Commanded
 from passiflex.robots.robot_file import RobotFile, a_urdf, unreadable
 from passiflex.robots.urdf_xml import MOST_BYTES
 from passiflex.texts.kinds import another_file
@@ -49,6 +49,7 @@ class RobotDescription:
     sources: Mapping[str, str]
     ranges: Mapping[str, tuple[float, float]]
     sensed: bool
+    commanded: Commanded | None
 
 
 class _Known(NamedTuple):
@@ -137,6 +138,7 @@ def _read(path: Path, *, quiet: bool = False) -> RobotDescription:
         position_limit=values["position_limit"],
         ranges=written.ranges,
         sensed=entries.torque_sensors,
+        commanded=entries.commanded,
         sources={"links": entries.source} | {entry: written.source(entry) for entry in UNITS},
     )
     if not quiet and parent_process() is None:  # whose parent has said it

@@ -111,6 +111,13 @@ class Entry(Section):
         return written
 
 
+class Commanded(Section):
+    """What commands the robot, and how often."""
+
+    rate: Annotated[float, Quantity("Hz", above=0)] = Field(description="at which it is commanded, Hz")
+    by: Text = Field(description="interface that does it")
+
+
 class Entries(Section):
     """A robot as it stands in its YAML file; `source` is that of the links."""
 
@@ -128,6 +135,7 @@ class Entries(Section):
         description="where other joints stand, by name, rad or m; 0 if left out, or amid a range without 0",
     )
     torque_sensors: bool = Field(default=True, description="whether it measures the torque in its joints")
+    commanded: Commanded | None = Field(default=None, description="what commands it, and how often")
     mount: Mount = Field(default=Mount(), description="how the base is mounted; as in the URDF if left out")
     source: Text = Field(description="where the numbers of the links come from")
     joint_stiffness: Entry = Field(description="K, with value, unit and source")

@@ -88,12 +88,9 @@ class LinearLoop:
         T = self.problem.period if period is None else period
         return Modes.radius_of(self.matrix(period, delay, gains), T, self.task_jacobian)
 
-    def holds(
-        self, period: float | None = None, delay: float | None = None, gains: Gains | None = None
-    ) -> bool:
+    def holds(self, period: float, delay: float, gains: Gains) -> bool:
         """Return whether `radius` is below 1, sooner."""
-        T = self.problem.period if period is None else period
-        return Modes.stable_of(self.matrix(period, delay, gains), T, self.task_jacobian)
+        return Modes.stable_of(self.matrix(period, delay, gains), period, self.task_jacobian)
 
     def trembling(self, delay: float, gains: Gains, settling: float) -> float:
         """Return the radius of what trembles, as `Modes.trembling_of` has it."""
