@@ -158,6 +158,17 @@ def test_a_urdf_in_place_of_a_robot_file_is_said_with_what_to_do(write, tmp_path
             FlexibleJointRobot.load(name)
 
 
+def test_a_file_may_say_what_commands_the_robot(write) -> None:
+    assert read_description(write()).commanded is None
+    by = read_description(
+        write("urdf: two.urdf", "commanded: {rate: 1 kHz, by: RTDE}\nurdf: two.urdf")
+    ).commanded
+    assert (by.rate, by.by) == (1000.0, "RTDE")
+    for wrong in ("{rate: 0 Hz, by: x}", "{rate: 1 ms, by: x}", "{rate: 1 kHz}", "1 kHz"):
+        with pytest.raises(RobotError, match="commanded"):
+            read_description(write("urdf: two.urdf", f"commanded: {wrong}\nurdf: two.urdf"))
+
+
 def test_only_regular_files_of_bearable_size_are_read(write, tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe.yaml")
     (tmp_path / "large.yaml").write_bytes(b"#" * 1_000_001)
