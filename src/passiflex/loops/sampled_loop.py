@@ -121,8 +121,7 @@ class SampledLoop:
         row, w = self.row.symbols("row")
         views, x = self.parameters.view(p), self.plant.view(state)
         plant, limits = views["plant"], views["limits"]
-        wrench, tau_a = self.plant.wrench(state, w, plant), robot.joint_torque(x, plant)
-        tau_e = robot.arm.jacobian(x.q, plant).T @ wrench
+        (wrench, tau_e), tau_a = self.plant.pushed(state, w, plant), robot.joint_torque(x, plant)
         y, read = self.sensors.read(
             Measurement(*x, tau_a, wrench, tau_e), w.torque_noise, w.elapsed, c, views["sensors"]
         )
