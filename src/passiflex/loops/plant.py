@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from passiflex.control.motion import Pose
+from passiflex.control.signals import Measurement
 from passiflex.elements import AbstractElement, Drag, Effect, MotorFriction, Touch, nothing
 from passiflex.layout import Field, Layout, Signal
 from passiflex.robots.arm import TipWrench
@@ -159,6 +160,12 @@ class Plant:
     def wrench(self, x: cs.SX, s: Any, m: Any) -> cs.SX:
         """Return all that acts on the end effector, in world axes (6,)."""
         return self._world_wrench(_sum(self._effects(self._touch(x, m), x, s, m), self.robot.n), x, s)
+
+    def sense(self, x: cs.SX, s: Any, m: Any) -> Measurement:
+        """Return what there is to be measured of the state x."""
+        robot, wrench = self.view(x), self.wrench(x, s, m)
+        tau_a = self.robot.joint_torque(robot, m)
+        return Measurement(*robot, tau_a, wrench, self.robot.arm.jacobian(robot.q, m).T @ wrench)
 
     def _world_wrench(self, touched: Effect, x: cs.SX, s: Any) -> cs.SX:
         parts = (
