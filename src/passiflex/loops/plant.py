@@ -167,6 +167,12 @@ class Plant:
         tau_a = self.robot.joint_torque(robot, m)
         return Measurement(*robot, tau_a, wrench, self.robot.arm.jacobian(robot.q, m).T @ wrench)
 
+    def touched(self, x: cs.SX, s: Any, m: Any) -> tuple[cs.SX, cs.SX]:
+        """Return what the elements do to the links and to the motors (n,) [N m]; F_e comes beside it."""
+        robot, effect = self.view(x), _sum(self._effects(self._touch(x, m), x, s, m), self.robot.n)
+        parts = (self.robot.arm.in_world_axes(robot.q, part) for part in (effect.force, effect.moment))
+        return self.robot.arm.jacobian(robot.q, m).T @ cs.vertcat(*parts), effect.motor
+
     def _world_wrench(self, touched: Effect, x: cs.SX, s: Any) -> cs.SX:
         parts = (
             self.robot.arm.in_world_axes(self.view(x).q, part) for part in (touched.force, touched.moment)

@@ -45,8 +45,9 @@ class Call(NamedTuple):
 class Mover(Protocol):
     """Moves a plant, and runs the law; y = (x, quadratures), p as in the call."""
 
-    why: str
-    """Why it can go no further, in words; empty as long as it can."""
+    @property
+    def why(self) -> str:
+        """Return why it can go no further, in words; empty as long as it can."""
 
     def control(self, y: Array, c: Array, row: Array, p: Array) -> tuple[Array, Array, Array]:
         """Return the memory after a period, the command, and the signals."""

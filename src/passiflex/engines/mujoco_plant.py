@@ -1,0 +1,116 @@
+"""The plant of a sampled loop in MuJoCo, moved step by step under the law's commands."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from passiflex.engines.mjcf import Options
+from passiflex.engines.mujoco_model import mujoco_model, mujoco_module
+from passiflex.loops.moved import MovedLoop
+from passiflex.native import NativeFunction
+from passiflex.problems.problem import SampledProblem
+
+Array = NDArray[np.float64]
+
+
+class MujocoPlant:
+    """Moves the plant of a problem in MuJoCo, and runs the law on what it is then (`native.python_loop.Mover`).
+
+    The motors' torques and the wrench from outside are actuators; what elements do is added to the passive forces at
+    every evaluation of them, so within a step too. Sensors are positions and velocities of the state itself.
+    """
+
+    def __init__(self, problem: SampledProblem, moved: MovedLoop, x: Array, step: float):
+        self._mujoco = mujoco_module()
+        plant = problem.loop.plant
+        robot, n = plant.robot, plant.robot.n
+        numbers = robot.layout.unpack(problem.plant[: robot.layout.size])
+        self.model = mujoco_model(robot, numbers, Options(step))
+        self.data = self._mujoco.MjData(self.model)
+        self._n, self._n_x, self._own = n, plant.state.size, plant.parameters.size
+        self._felt, self._step = plant.environment.size, step
+        self._moved, self._acts = moved, any(e.acts for e in plant.elements)
+        self._where, self._speed, self._told = self.data.qpos, self.data.qvel, self.data.ctrl
+        self._passive, self._warned = self.data.qfrc_passive, 0
+        self._where[:n], self._where[n : 2 * n] = x[n : 2 * n], x[:n]
+        self._speed[:n], self._speed[n : 2 * n] = x[3 * n : 4 * n], x[2 * n : 3 * n]
+        moved.push.inputs[2][:] = moved.passed.inputs[3][:] = problem.plant
+
+    @property
+    def why(self) -> str:
+        """Return what MuJoCo warned of; empty while it did not."""
+        numbers = self.data.warning.number
+        if not numbers.any():
+            return ""
+        kinds = self._mujoco.mjtWarning
+        names = [kinds(i).name.removeprefix("mjWARN_") for i in np.flatnonzero(numbers)]
+        return f"MuJoCo warned of {', '.join(names)} {self.data.time:.4g} s after the start"
+
+    def control(self, y: Array, c: Array, row: Array, p: Array) -> tuple[Array, Array, Array]:
+        """Return the memory after a period, the command, and the signals."""
+        sense, law = self._moved.sense, self._moved.law
+        sense.inputs[0][:], sense.inputs[1][:], sense.inputs[2][:] = (
+            y[: self._n_x],
+            row[: self._felt],
+            p[: self._own],
+        )
+        sense.call()
+        law.inputs[0][:], law.inputs[1][:] = sense.outputs[0], c
+        law.inputs[2][:], law.inputs[3][:] = row[self._felt :], p[self._own :]
+        law.call()
+        after, command, signals = law.outputs
+        return after, command, signals
+
+    def step(self, y: Array, inputs: Array, p: Array, h: float) -> None:
+        """Take one step of MuJoCo's integrator, and sum up what passed the ports meanwhile."""
+        n, passed = self._n, self._moved.passed
+        if h != self._step:
+            self.model.opt.timestep = self._step = h
+        self._told[:] = inputs[: n + 6]
+        passed.inputs[0][:], passed.inputs[2][:], passed.inputs[4][:] = y[: self._n_x], inputs, h
+        if self._acts:
+            self._moved.push.inputs[1][:] = inputs[n:]
+            self._mujoco.set_mjcb_passive(self._push)
+            try:
+                self._mujoco.mj_step(self.model, self.data)
+            finally:
+                self._mujoco.set_mjcb_passive(None)
+        else:
+            self._mujoco.mj_step(self.model, self.data)
+        self._read(y)
+        passed.inputs[1][:] = y[: self._n_x]
+        passed.call()
+        y[self._n_x :] += passed.outputs[0]
+
+    def look(self, w: Array, time: float, y: Array, held: Array, c: Array, z: Array, p: Array) -> Array:
+        """Return what the watch remembers after a sample."""
+        return _called(self._moved.look, w, time, y, held, c, z, p)
+
+    def glance(self, w: Array, time: float, y: Array, p: Array) -> Array:
+        """Return what the watch remembers after a step."""
+        return _called(self._moved.glance, w, time, y, p)
+
+    def _read(self, x: Array) -> None:
+        n = self._n
+        x[:n], x[n : 2 * n] = self._where[n : 2 * n], self._where[:n]
+        x[2 * n : 3 * n], x[3 * n : 4 * n] = self._speed[n : 2 * n], self._speed[:n]
+
+    def _push(self, model: Any, data: Any) -> None:
+        """Add what the elements do to MuJoCo's passive forces."""
+        n, push = self._n, self._moved.push
+        self._read(push.inputs[0])
+        push.call()
+        torques = push.outputs[0]
+        self._passive[:n] += torques[n:]
+        self._passive[n : 2 * n] += torques[:n]
+
+
+def _called(function: NativeFunction, *values: Array | float) -> Array:
+    """Return the first output, without the checks and copies of a call by arguments."""
+    for into, value in zip(function.inputs, values, strict=True):
+        into[:] = value
+    function.call()
+    return function.outputs[0]
