@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
-from passiflex.robots.bodies import Body, components, from_origin, matrix, rotation_of
+from passiflex.robots.bodies import Body, components, from_origin, matrix, rotation_of, triangle_defect
 from passiflex.robots.chain import SerialChain
 from passiflex.robots.flexible import FlexibleJointRobot
 
@@ -153,6 +153,17 @@ def _links(chain: SerialChain, numbers: Mapping[str, Any]) -> list[str]:
 def link_body(numbers: Mapping[str, Any], i: int) -> Body:
     """Return a link, counted from 0, of the numbers of a robot."""
     return from_origin(numbers["link_mass"][i], numbers["link_moment"][i], numbers["link_inertia"][i])
+
+
+def cut_inertias(robot: FlexibleJointRobot, numbers: Mapping[str, Any]) -> list[str]:
+    """Return a line on each link whose inertia is not that of its `possible` one."""
+    out = []
+    for i, joint in enumerate(robot.arm.chain.joints):
+        if moments := triangle_defect(link_body(numbers, i)):
+            out.append(
+                f"the link moved by joint {joint.name!r} has principal moments that no body has, {moments}"
+            )
+    return out
 
 
 def possible(inertia: Array) -> Array:

@@ -71,15 +71,15 @@ class MujocoPlant:
             self.model.opt.timestep = self._step = h
         self._told[:] = inputs[: n + 6]
         passed.inputs[0][:], passed.inputs[2][:], passed.inputs[4][:] = y[: self._n_x], inputs, h
-        if self._acts:
-            self._moved.push.inputs[1][:] = inputs[n:]
-            self._mujoco.set_mjcb_passive(self._push)
-            try:
-                self._mujoco.mj_step(self.model, self.data)
-            finally:
-                self._mujoco.set_mjcb_passive(None)
-        else:
-            self._mujoco.mj_step(self.model, self.data)
+        self._moved.push.inputs[1][:] = inputs[n:]
+        mujoco = self._mujoco
+        mujoco.set_mju_user_warning(_silent)
+        mujoco.set_mjcb_passive(self._push if self._acts else None)
+        try:
+            mujoco.mj_step(self.model, self.data)
+        finally:
+            mujoco.set_mjcb_passive(None)
+            mujoco.set_mju_user_warning(None)
         self._read(y)
         passed.inputs[1][:] = y[: self._n_x]
         passed.call()
@@ -106,6 +106,10 @@ class MujocoPlant:
         torques = push.outputs[0]
         self._passive[:n] += torques[n:]
         self._passive[n : 2 * n] += torques[:n]
+
+
+def _silent(text: str) -> None:
+    """Hear a warning of MuJoCo, which would write a file of it where one stands; `MujocoPlant.why` says it."""
 
 
 def _called(function: NativeFunction, *values: Array | float) -> Array:

@@ -75,6 +75,11 @@ class Run:
         return str(self.data.attrs.get("engine", ""))
 
     @property
+    def moved_elsewhere(self) -> bool:
+        """Return whether another simulator moved the plant."""
+        return bool(self.engine) and not self.engine.startswith("passiflex")
+
+    @property
     def sampled(self) -> bool:
         """Return whether the law ran once per control period."""
         return bool(self.data.attrs["control_period"])
