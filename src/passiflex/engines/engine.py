@@ -8,6 +8,8 @@ from typing import ClassVar, final
 import numpy as np
 from numpy.typing import NDArray
 
+from passiflex.engines.contact import Contact, contact_of
+from passiflex.engines.felt import Felt, felt
 from passiflex.errors import NameUnknownError, ValueRangeError
 from passiflex.loops.compiled import CompiledSampledLoop
 from passiflex.loops.moved import moved_loop
@@ -36,6 +38,10 @@ class AbstractEngine(abc.ABC):
     @abc.abstractmethod
     def require(self, problem: Problem) -> None:
         """Refuse a problem that it cannot run, before anything is compiled."""
+
+    def prepared(self, problem: SampledProblem) -> SampledProblem:
+        """Return the problem as the engine runs it: with the elements that it moves itself only felt."""
+        return problem
 
     @abc.abstractmethod
     def held(
@@ -98,8 +104,10 @@ class MujocoEngine(AbstractEngine):
                 needs="`control: {rate: …}` in the scenario",
                 try_="the engine passiflex",
             )
-        n = problem.law.robot.n
-        if remember := [e.name for e in problem.elements if e.acts and e.state(n).size]:
+        n, made = problem.law.robot.n, contacts_of(problem)
+        if remember := [
+            e.name for e in problem.elements if e.acts and e.state(n).size and e.name not in made
+        ]:
             raise ValueRangeError(
                 "the engine mujoco knows no such element",
                 got=", ".join(remember),
@@ -107,15 +115,28 @@ class MujocoEngine(AbstractEngine):
                 try_="the engine passiflex",
             )
 
+    def prepared(self, problem: SampledProblem) -> SampledProblem:
+        """Return the problem with what MuJoCo touches only felt."""
+        made = contacts_of(problem)
+        return felt(problem, made) if made else problem
+
     def held(
         self, problem: SampledProblem, compiled: CompiledSampledLoop, x: Array, longest: float
     ) -> HeldLoop:
         """Return the loop on a new model."""
         from passiflex.engines.mujoco_plant import MujocoPlant
 
-        plant = MujocoPlant(problem, moved_loop(problem.loop), x, longest)
+        plant = MujocoPlant(problem, moved_loop(problem.loop), x, longest, contacts_of(problem))
         loop = compiled.loop
         return HeldLoop(loop.plant.rhs, loop.control, watch=loop.watch, mover=plant)
+
+
+def contacts_of(problem: SampledProblem) -> dict[str, Contact]:
+    """Return what MuJoCo makes of the elements of a problem, by their names."""
+    numbers = problem.parts.unpack("plant", problem.numbers)
+    elements = ((e.name, e.element if isinstance(e, Felt) else e) for e in problem.elements if e.acts)
+    made = ((name, contact_of(element, numbers)) for name, element in elements)
+    return {name: contact for name, contact in made if contact is not None}
 
 
 NATIVE = NativeEngine()

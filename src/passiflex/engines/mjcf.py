@@ -81,7 +81,7 @@ def mjcf(
         f'<mujoco model="{_escaped(robot.name)}">',
         '<compiler angle="radian" autolimits="false" inertiafromgeom="false" balanceinertia="false"/>',
         f'<option integrator="{options.integrator}" timestep="{options.step!r}" gravity="{said(numbers["gravity"])}"'
-        ' cone="elliptic" impratio="10">',
+        ' cone="elliptic" impratio="1e6">',
         f'  <flag contact="{touch}" constraint="{touch}" autoreset="disable"/>',
         "</option>",
         '<default><geom density="0" contype="0" conaffinity="0"/></default>',

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from passiflex.engines.mjcf import Options, Piece, link_body, mjcf, possible
+from passiflex.engines.contact import Contact, contact_piece, stiffen
+from passiflex.engines.mjcf import Options, link_body, mjcf, possible
 from passiflex.extras import MissingExtraError, imported
 from passiflex.robots.bodies import matrix
 from passiflex.robots.flexible import FlexibleJointRobot
 
 OLDEST = 4
+NOTHING: Mapping[str, Contact] = MappingProxyType({})
 
 
 def mujoco_module() -> Any:
@@ -37,10 +40,17 @@ def require_recent(version: str) -> None:
 
 
 def mujoco_model(
-    robot: FlexibleJointRobot, numbers: Mapping[str, Any], options: Options, pieces: Sequence[Piece] = ()
+    robot: FlexibleJointRobot,
+    numbers: Mapping[str, Any],
+    options: Options,
+    contacts: Mapping[str, Contact] = NOTHING,
 ) -> Any:
-    """Return the `MjModel` of `mjcf`, with inertias that MuJoCo's compiler refuses put in afterwards."""
+    """Return the `MjModel` of `mjcf`, with contacts by name.
+
+    Inertias that MuJoCo's compiler refuses are put in afterwards, and so are the stiffnesses of contacts.
+    """
     mujoco = mujoco_module()
+    pieces = [contact_piece(name, contact) for name, contact in contacts.items()]
     model = mujoco.MjModel.from_xml_string(mjcf(robot, numbers, options, pieces))
     changed = False
     for i in range(robot.n):
@@ -56,4 +66,6 @@ def mujoco_model(
     if changed:
         model.body_sameframe[:] = 0
         mujoco.mj_setConst(model, mujoco.MjData(model))
+    for name, contact in contacts.items():
+        stiffen(model, name, contact)
     return model

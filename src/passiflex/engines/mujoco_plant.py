@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from passiflex.engines.contact import Contact
 from passiflex.engines.mjcf import Options
-from passiflex.engines.mujoco_model import mujoco_model, mujoco_module
+from passiflex.engines.mujoco_model import NOTHING, mujoco_model, mujoco_module
+from passiflex.engines.touching import Touching
 from passiflex.loops.moved import MovedLoop
 from passiflex.native import NativeFunction
 from passiflex.problems.problem import SampledProblem
@@ -23,12 +26,19 @@ class MujocoPlant:
     every evaluation of them, so within a step too. Sensors are positions and velocities of the state itself.
     """
 
-    def __init__(self, problem: SampledProblem, moved: MovedLoop, x: Array, step: float):
+    def __init__(
+        self,
+        problem: SampledProblem,
+        moved: MovedLoop,
+        x: Array,
+        step: float,
+        contacts: Mapping[str, Contact] = NOTHING,
+    ):
         self._mujoco = mujoco_module()
         plant = problem.loop.plant
         robot, n = plant.robot, plant.robot.n
         numbers = robot.layout.unpack(problem.plant[: robot.layout.size])
-        self.model = mujoco_model(robot, numbers, Options(step))
+        self.model = mujoco_model(robot, numbers, Options(step, contact=bool(contacts)), contacts)
         self.data = self._mujoco.MjData(self.model)
         self._n, self._n_x, self._own = n, plant.state.size, plant.parameters.size
         self._felt, self._step = plant.environment.size, step
@@ -37,6 +47,7 @@ class MujocoPlant:
         self._passive, self._warned = self.data.qfrc_passive, 0
         self._where[:n], self._where[n : 2 * n] = x[n : 2 * n], x[:n]
         self._speed[:n], self._speed[n : 2 * n] = x[3 * n : 4 * n], x[2 * n : 3 * n]
+        self._touching = Touching(self.model, self.data, contacts, plant.state)
         moved.push.inputs[2][:] = moved.passed.inputs[3][:] = problem.plant
 
     @property
@@ -77,10 +88,13 @@ class MujocoPlant:
         mujoco.set_mjcb_passive(self._push if self._acts else None)
         try:
             mujoco.mj_step(self.model, self.data)
+            if self._touching.any():
+                mujoco.mj_forward(self.model, self.data)
         finally:
             mujoco.set_mjcb_passive(None)
             mujoco.set_mju_user_warning(None)
         self._read(y)
+        self._touching.feel(y)
         passed.inputs[1][:] = y[: self._n_x]
         passed.call()
         y[self._n_x :] += passed.outputs[0]

@@ -45,7 +45,8 @@ def simulate_sampled(problem: SampledProblem, engine: AbstractEngine = NATIVE) -
 
 def simulate_unchecked(problem: SampledProblem, engine: AbstractEngine = NATIVE) -> Run:
     """Return the run of a sampled problem, stable or not."""
-    return _record(charged(problem), compiled_sampled_loop(problem.loop), engine)
+    moved = engine.prepared(charged(problem))
+    return _record(moved, compiled_sampled_loop(moved.loop), engine)
 
 
 def start(problem: SampledProblem, compiled: CompiledSampledLoop) -> LoopState:
