@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from passiflex.engines.contact import Contact
+from passiflex.engines.felt import Felt
 from passiflex.engines.mjcf import Options
 from passiflex.engines.mujoco_model import NOTHING, mujoco_model, mujoco_module
 from passiflex.engines.touching import Touching
-from passiflex.loops.moved import MovedLoop
+from passiflex.loops.moved import WEIGHTS, MovedLoop
 from passiflex.native import NativeFunction
 from passiflex.problems.problem import SampledProblem
 
@@ -22,8 +23,9 @@ Array = NDArray[np.float64]
 class MujocoPlant:
     """Moves the plant of a problem in MuJoCo, and runs the law on what it is then (`native.python_loop.Mover`).
 
-    The motors' torques and the wrench from outside are actuators; what elements do is added to the passive forces at
-    every evaluation of them, so within a step too. Sensors are positions and velocities of the state itself.
+    The motors' torques and the wrench from outside are actuators. What elements do is added to the passive forces at
+    every stage of a step; energies are summed up over the same stages, by the very rule that moved the robot. Sensors
+    are positions and velocities of the state itself.
     """
 
     def __init__(
@@ -41,14 +43,16 @@ class MujocoPlant:
         self.model = mujoco_model(robot, numbers, Options(step, contact=bool(contacts)), contacts)
         self.data = self._mujoco.MjData(self.model)
         self._n, self._n_x, self._own = n, plant.state.size, plant.parameters.size
-        self._felt, self._step = plant.environment.size, step
-        self._moved, self._acts = moved, any(e.acts for e in plant.elements)
+        self._felt, self._step, self._moved = plant.environment.size, step, moved
         self._where, self._speed, self._told = self.data.qpos, self.data.qvel, self.data.ctrl
-        self._passive, self._warned = self.data.qfrc_passive, 0
+        self._passive, self._held = self.data.qfrc_passive, self.data.qfrc_constraint
         self._where[:n], self._where[n : 2 * n] = x[n : 2 * n], x[:n]
         self._speed[:n], self._speed[n : 2 * n] = x[3 * n : 4 * n], x[2 * n : 3 * n]
-        self._touching = Touching(self.model, self.data, contacts, plant.state)
-        moved.push.inputs[2][:] = moved.passed.inputs[3][:] = problem.plant
+        self._touching = Touching(self.model, self.data, contacts, plant) if contacts else None
+        self._acts = any(e.acts for e in plant.elements if not isinstance(e, Felt))
+        self._stages = moved.passed.inputs[0].reshape(len(WEIGHTS), 4 * n)
+        self._stage, self._given = 0, 0.0
+        moved.push.inputs[2][:] = moved.passed.inputs[2][:] = problem.plant
 
     @property
     def why(self) -> str:
@@ -77,27 +81,28 @@ class MujocoPlant:
 
     def step(self, y: Array, inputs: Array, p: Array, h: float) -> None:
         """Take one step of MuJoCo's integrator, and sum up what passed the ports meanwhile."""
-        n, passed = self._n, self._moved.passed
+        n, mujoco, touching, passed = self._n, self._mujoco, self._touching, self._moved.passed
         if h != self._step:
             self.model.opt.timestep = self._step = h
-        self._told[:] = inputs[: n + 6]
-        passed.inputs[0][:], passed.inputs[2][:], passed.inputs[4][:] = y[: self._n_x], inputs, h
-        self._moved.push.inputs[1][:] = inputs[n:]
-        mujoco = self._mujoco
+        self._told[:], self._moved.push.inputs[1][:] = inputs[: n + 6], inputs[n:]
+        self._stage, self._given = 0, 0.0
         mujoco.set_mju_user_warning(_silent)
-        mujoco.set_mjcb_passive(self._push if self._acts else None)
+        mujoco.set_mjcb_passive(self._staged)
         try:
             mujoco.mj_step(self.model, self.data)
-            if self._touching.any():
-                mujoco.mj_forward(self.model, self.data)
+            if touching is not None:
+                self._touched()
+                if self.data.ncon:
+                    mujoco.mj_forward(self.model, self.data)
         finally:
             mujoco.set_mjcb_passive(None)
             mujoco.set_mju_user_warning(None)
-        self._read(y)
-        self._touching.feel(y)
-        passed.inputs[1][:] = y[: self._n_x]
+        passed.inputs[1][:], passed.inputs[3][:] = inputs, h
         passed.call()
+        self._read(y)
         y[self._n_x :] += passed.outputs[0]
+        if touching is not None:
+            touching.feel(y, h * self._given)
 
     def look(self, w: Array, time: float, y: Array, held: Array, c: Array, z: Array, p: Array) -> Array:
         """Return what the watch remembers after a sample."""
@@ -112,14 +117,25 @@ class MujocoPlant:
         x[:n], x[n : 2 * n] = self._where[n : 2 * n], self._where[:n]
         x[2 * n : 3 * n], x[3 * n : 4 * n] = self._speed[n : 2 * n], self._speed[:n]
 
-    def _push(self, model: Any, data: Any) -> None:
-        """Add what the elements do to MuJoCo's passive forces."""
-        n, push = self._n, self._moved.push
-        self._read(push.inputs[0])
-        push.call()
-        torques = push.outputs[0]
-        self._passive[:n] += torques[n:]
-        self._passive[n : 2 * n] += torques[:n]
+    def _staged(self, model: Any, data: Any) -> None:
+        """Note a stage, and add what the elements do to MuJoCo's passive forces."""
+        n, stage = self._n, self._stage
+        if stage < len(WEIGHTS):
+            if stage and self._touching is not None:
+                self._touched()
+            moving = self._stages[stage]
+            moving[: 2 * n], moving[2 * n :] = self._where, self._speed
+            self._stage = stage + 1
+        if self._acts:
+            push = self._moved.push
+            push.inputs[0][: 2 * n], push.inputs[0][2 * n :] = self._where, self._speed
+            push.call()
+            self._passive += push.outputs[0]
+
+    def _touched(self) -> None:
+        """Add the power of the contacts in the stage before: their forces are known when it has ended."""
+        n, before = self._n, self._stage - 1
+        self._given += WEIGHTS[before] * float(self._held[n:] @ self._stages[before, 3 * n :])
 
 
 def _silent(text: str) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,9 +11,19 @@ from numpy.typing import NDArray
 from passiflex.engines.contact import Contact, hand_geom
 from passiflex.engines.felt import FELT
 from passiflex.engines.mujoco_model import mujoco_module
-from passiflex.layout import Layout
+from passiflex.loops.plant import Plant
 
 Array = NDArray[np.float64]
+
+
+class _Where(NamedTuple):
+    """Where an element is in y = (x, energies): what is felt of it, and what it gave and lost."""
+
+    wrench: slice
+    lost: slice
+    stored: slice
+    given: slice
+    loss: slice
 
 
 class Touching:
@@ -23,7 +33,7 @@ class Touching:
     it but for what its spring takes up: the damper, the friction, and what is left of MuJoCo's mass in it.
     """
 
-    def __init__(self, model: Any, data: Any, contacts: Mapping[str, Contact], state: Layout):
+    def __init__(self, model: Any, data: Any, contacts: Mapping[str, Contact], plant: Plant):
         self._mujoco = mujoco_module()
         self._model, self._data = model, data
         self._of = {
@@ -31,38 +41,49 @@ class Touching:
             for name, contact in contacts.items()
             for i in range(len(contact.points))
         }
-        self._at = {name: [state.slices[f"{name}_{part}"] for part in FELT] for name in contacts}
+        state, energies, begin = plant.state.slices, plant.energies.slices, plant.state.size
+        books = {e.name: e.books for e in plant.booked}
+        self._at = {}
+        for name in contacts:
+            passed = (energies[flow] for flow in (books[name].given, books[name].name))
+            sums = [slice(begin + at.start, begin + at.stop) for at in passed]
+            self._at[name] = _Where(*(state[f"{name}_{part}"] for part in FELT), *sums)
+        self._external = begin + energies["external"].start
         self._tip, self._force = model.site("tip").id, np.zeros(6)
 
-    def any(self) -> bool:
-        """Return whether anything touches."""
-        return bool(self._of) and self._data.ncon > 0
+    def feel(self, y: Array, given: float) -> None:
+        """Write what is felt after a step in which the contacts gave so much energy to the links [J]."""
+        held = {name: float(y[at.stored][0]) for name, at in self._at.items()}
+        share = {name: float(np.linalg.norm(y[at.wrench][:3])) for name, at in self._at.items()}
+        for at in self._at.values():
+            for part in at[: len(FELT)]:
+                y[part] = 0.0
+        for i in range(self._data.ncon):
+            self._add(y, i)
+        y[self._external] += given
+        for name, at in self._at.items():
+            share[name] += float(np.linalg.norm(y[at.wrench][:3]))
+        whole = sum(share.values())
+        for name, at in self._at.items():
+            own = given * (share[name] / whole if whole else 1 / len(self._at))
+            y[at.given] += own
+            y[at.loss] -= own + float(y[at.stored][0]) - held[name]
 
-    def feel(self, x: Array) -> None:
-        """Write what is felt into a state."""
-        if not self._of:
-            return
-        for parts in self._at.values():
-            for part in parts:
-                x[part] = 0.0
+    def _add(self, y: Array, i: int) -> None:
+        """Add one contact to what is felt."""
         data, force = self._data, self._force
-        for i in range(data.ncon):
-            contact = data.contact[i]
-            first, second = contact.geom
-            hand = second if second in self._of else first
-            if contact.efc_address < 0:
-                continue
-            name, stiffness = self._of[hand]
-            wrench, lost, stored = self._at[name]
-            self._mujoco.mj_contactForce(self._model, data, i, force)
-            frame = contact.frame.reshape(3, 3)
-            pushed = (frame.T @ force[:3]) * (1.0 if hand == second else -1.0)
-            x[wrench][:3] += pushed
-            x[wrench][3:] += np.cross(contact.pos - data.site_xpos[self._tip], pushed)
-            depth, rows = (
-                max(0.0, -contact.dist),
-                slice(contact.efc_address, contact.efc_address + contact.dim),
-            )
-            speed = data.efc_vel[rows]
-            x[lost] += stiffness * depth * speed[0] - force[: contact.dim] @ speed
-            x[stored] += stiffness * depth**2 / 2
+        contact = data.contact[i]
+        if contact.efc_address < 0:
+            return
+        first, second = contact.geom
+        hand = second if second in self._of else first
+        name, stiffness = self._of[hand]
+        at = self._at[name]
+        self._mujoco.mj_contactForce(self._model, data, i, force)
+        pushed = (contact.frame.reshape(3, 3).T @ force[:3]) * (1.0 if hand == second else -1.0)
+        y[at.wrench][:3] += pushed
+        y[at.wrench][3:] += np.cross(contact.pos - data.site_xpos[self._tip], pushed)
+        depth = max(0.0, -contact.dist)
+        speed = data.efc_vel[contact.efc_address : contact.efc_address + contact.dim]
+        y[at.lost] += -stiffness * depth * speed[0] - force[: contact.dim] @ speed
+        y[at.stored] += stiffness * depth**2 / 2

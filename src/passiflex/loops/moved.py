@@ -12,6 +12,9 @@ from passiflex.loops.plant import Plant
 from passiflex.loops.sampled_loop import SampledLoop
 from passiflex.native import NativeFunction, compile_functions
 
+WEIGHTS = (1 / 6, 1 / 3, 1 / 3, 1 / 6)
+"""Of the stages of the classical Runge-Kutta method."""
+
 _built: dict[Hashable, MovedLoop] = {}
 
 
@@ -23,8 +26,11 @@ class MovedLoop:
     ----------
     sense: (x, environment, p) → what there is to be measured.
     law: (measured, c, row without environment, p without the plant's) → (c, command, signals).
-    push: (x, environment, p) → what the elements do to the links and to the motors (2 n,) [N m].
-    passed: (x before, x after, [command, environment], p, h) → what passed the ports in a step of h seconds [J].
+    push: (moving, environment, p) → what the elements do to the motors and to the links (2 n,) [N m].
+    passed: (moving at each stage, [command, environment], p, h) → what passed the ports in a step of h seconds [J], by
+        the classical Runge-Kutta rule.
+
+    `moving` is (θ, q, θ̇, q̇).
     look, glance: Of the witness.
     """
 
@@ -48,23 +54,29 @@ def moved_loop(loop: SampledLoop) -> MovedLoop:
 
 
 def push(plant: Plant) -> cs.Function:
-    """Return (x, environment, p) → the torques of what touches the robot: on the links, then on the motors."""
-    x, (s, environment) = cs.SX.sym("x", plant.state.size), plant.environment.symbols("s")
+    """Return (moving, environment, p) → the torques of what touches the robot, on the motors first."""
+    moving, (s, environment) = cs.SX.sym("moving", 4 * plant.robot.n), plant.environment.symbols("s")
     p, m = plant.parameters.symbols("p")
-    touched = plant.touched(x, environment, m)
-    return cs.Function("push", [x, s, p], [cs.densify(cs.vertcat(*touched))], {"cse": True})
+    links, motors = plant.touched(_state(plant, moving), environment, m)
+    return cs.Function("push", [moving, s, p], [cs.densify(cs.vertcat(motors, links))], {"cse": True})
 
 
 def passed(plant: Plant) -> cs.Function:
-    """Return (x before, x after, u, p, h) → the energies that passed in a step.
+    """Return (moving at each stage, [command, environment], p, h) → the energies that passed in a step."""
+    n = plant.robot.n
+    stages, h = cs.SX.sym("stages", len(WEIGHTS) * 4 * n), cs.SX.sym("h")
+    command, (s, environment) = cs.SX.sym("command", n), plant.environment.symbols("s")
+    p, m = plant.parameters.symbols("p")
+    energies = cs.SX.zeros(plant.energies.size)
+    for weight, moving in zip(WEIGHTS, cs.vertsplit(stages, 4 * n), strict=True):
+        powers = plant.flow(_state(plant, moving), command, environment, m).powers
+        energies += weight * plant.energies.stack(powers)
+    inputs = [stages, cs.vertcat(command, s), p, h]
+    return cs.Function("passed", inputs, [cs.densify(h * energies)], {"cse": True})
 
-    By Simpson's rule, with what is in the middle from the cubic through both ends and their rates, by the plant's own
-    equations: an error of order h⁵ where the step has no jump, whoever took it.
-    """
-    rhs = plant.rhs
-    before, after = cs.SX.sym("before", plant.state.size), cs.SX.sym("after", plant.state.size)
-    inputs, numbers, h = cs.SX.sym("u", rhs.size1_in(1)), cs.SX.sym("p", rhs.size1_in(2)), cs.SX.sym("h")
-    (first, begin), (last, end) = rhs(before, inputs, numbers), rhs(after, inputs, numbers)
-    middle = rhs((before + after) / 2 + h / 8 * (first - last), inputs, numbers)[1]
-    energies = h / 6 * (begin + 4 * middle + end)
-    return cs.Function("passed", [before, after, inputs, numbers, h], [cs.densify(energies)], {"cse": True})
+
+def _state(plant: Plant, moving: cs.SX) -> cs.SX:
+    """Return the state of a plant without a state of elements: what stands for some of them does nothing in it."""
+    theta, q, dtheta, dq = cs.vertsplit(moving, plant.robot.n)
+    robot = cs.vertcat(q, theta, dq, dtheta)
+    return cs.vertcat(robot, cs.SX.zeros(plant.state.size - robot.numel()))
