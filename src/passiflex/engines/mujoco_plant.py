@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -52,6 +52,7 @@ class MujocoPlant:
         self._acts = any(e.acts for e in plant.elements if not isinstance(e, Felt))
         self._stages = moved.passed.inputs[0].reshape(len(WEIGHTS), 4 * n)
         self._stage, self._given = 0, 0.0
+        self._due, self._felt_since = 0.0, False
         moved.push.inputs[2][:] = moved.passed.inputs[2][:] = problem.plant
 
     @property
@@ -66,6 +67,7 @@ class MujocoPlant:
 
     def control(self, y: Array, c: Array, row: Array, p: Array) -> tuple[Array, Array, Array]:
         """Return the memory after a period, the command, and the signals."""
+        self._feel(y)
         sense, law = self._moved.sense, self._moved.law
         sense.inputs[0][:], sense.inputs[1][:], sense.inputs[2][:] = (
             y[: self._n_x],
@@ -86,26 +88,40 @@ class MujocoPlant:
             self.model.opt.timestep = self._step = h
         self._told[:], self._moved.push.inputs[1][:] = inputs[: n + 6], inputs[n:]
         self._stage, self._given = 0, 0.0
-        mujoco.set_mju_user_warning(_silent)
-        mujoco.set_mjcb_passive(self._staged)
-        try:
-            mujoco.mj_step(self.model, self.data)
-            if touching is not None:
-                self._touched()
-                if self.data.ncon:
-                    mujoco.mj_forward(self.model, self.data)
-        finally:
-            mujoco.set_mjcb_passive(None)
-            mujoco.set_mju_user_warning(None)
+        self._in_mujoco(mujoco.mj_step)
+        if touching is not None:
+            self._touched()
+            self._due += h * self._given
+            self._felt_since = False
         passed.inputs[1][:], passed.inputs[3][:] = inputs, h
         passed.call()
         self._read(y)
         y[self._n_x :] += passed.outputs[0]
-        if touching is not None:
-            touching.feel(y, h * self._given)
+
+    def _in_mujoco(self, function: Callable[[Any, Any], None]) -> None:
+        """Call one of MuJoCo's functions, with what the elements do; its callbacks are those of a process."""
+        mujoco = self._mujoco
+        mujoco.set_mju_user_warning(_silent)
+        mujoco.set_mjcb_passive(self._staged)
+        try:
+            function(self.model, self.data)
+        finally:
+            mujoco.set_mjcb_passive(None)
+            mujoco.set_mju_user_warning(None)
+
+    def _feel(self, y: Array) -> None:
+        """Write into y what is felt of the contacts now, and what passed them since it was written last."""
+        if self._touching is None or self._felt_since:
+            return
+        if self.data.ncon or not self.data.time:
+            self._stage = len(WEIGHTS)
+            self._in_mujoco(self._mujoco.mj_forward)
+        self._touching.feel(y, self._due)
+        self._due, self._felt_since = 0.0, True
 
     def look(self, w: Array, time: float, y: Array, held: Array, c: Array, z: Array, p: Array) -> Array:
         """Return what the watch remembers after a sample."""
+        self._feel(y)
         return _called(self._moved.look, w, time, y, held, c, z, p)
 
     def glance(self, w: Array, time: float, y: Array, p: Array) -> Array:

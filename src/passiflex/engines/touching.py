@@ -52,22 +52,26 @@ class Touching:
         self._tip, self._force = model.site("tip").id, np.zeros(6)
 
     def feel(self, y: Array, given: float) -> None:
-        """Write what is felt after a step in which the contacts gave so much energy to the links [J]."""
-        held = {name: float(y[at.stored][0]) for name, at in self._at.items()}
-        share = {name: float(np.linalg.norm(y[at.wrench][:3])) for name, at in self._at.items()}
-        for at in self._at.values():
+        """Write what is felt now, after the contacts gave so much energy to the links since it was written last [J].
+
+        It is shared out by the forces then and now, where several touch.
+        """
+        held, share = {}, {}
+        for name, at in self._at.items():
+            held[name] = y[at.stored].item()
+            share[name] = np.abs(y[at.wrench][:3]).sum()
             for part in at[: len(FELT)]:
                 y[part] = 0.0
         for i in range(self._data.ncon):
             self._add(y, i)
         y[self._external] += given
         for name, at in self._at.items():
-            share[name] += float(np.linalg.norm(y[at.wrench][:3]))
+            share[name] += np.abs(y[at.wrench][:3]).sum()
         whole = sum(share.values())
         for name, at in self._at.items():
             own = given * (share[name] / whole if whole else 1 / len(self._at))
             y[at.given] += own
-            y[at.loss] -= own + float(y[at.stored][0]) - held[name]
+            y[at.loss] -= own + y[at.stored].item() - held[name]
 
     def _add(self, y: Array, i: int) -> None:
         """Add one contact to what is felt."""
@@ -75,14 +79,16 @@ class Touching:
         contact = data.contact[i]
         if contact.efc_address < 0:
             return
-        first, second = contact.geom
+        first, second = contact.geom.tolist()
         hand = second if second in self._of else first
         name, stiffness = self._of[hand]
         at = self._at[name]
         self._mujoco.mj_contactForce(self._model, data, i, force)
-        pushed = (contact.frame.reshape(3, 3).T @ force[:3]) * (1.0 if hand == second else -1.0)
-        y[at.wrench][:3] += pushed
-        y[at.wrench][3:] += np.cross(contact.pos - data.site_xpos[self._tip], pushed)
+        fx, fy, fz = pushed = (force[:3] if hand == second else -force[:3]) @ contact.frame.reshape(3, 3)
+        x, y_, z = contact.pos - data.site_xpos[self._tip]
+        wrench = y[at.wrench]
+        wrench[:3] += pushed
+        wrench[3:] += y_ * fz - z * fy, z * fx - x * fz, x * fy - y_ * fx
         depth = max(0.0, -contact.dist)
         speed = data.efc_vel[contact.efc_address : contact.efc_address + contact.dim]
         y[at.lost] += -stiffness * depth * speed[0] - force[: contact.dim] @ speed
