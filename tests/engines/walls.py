@@ -79,6 +79,7 @@ def _(element: Wall, numbers: Mapping[str, Any]) -> Contact:
         np.eye(3),
         float(numbers["wall_stiffness"]),
         float(numbers["wall_damping"]),
+        0.0,
         element.friction,
         np.zeros((1, 3)),
         element.roundness,

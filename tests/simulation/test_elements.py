@@ -10,63 +10,15 @@ import casadi as cs
 import numpy as np
 import pytest
 from hypothesis import given, settings
-from scipy.spatial.transform import Rotation
 
 from arms import serial_chains
+from honest import N, numbers, require_honest
 from loops import SEEDS, with_joints
 from passiflex.elements import AbstractElement, Drag, Effect, MotorFriction, Touch, nothing
 from passiflex.layout import Field, Layout
 from passiflex.loops.plant import ELEMENTS, Plant
 from passiflex.robots.chain import SerialChain
 from passiflex.robots.flexible import FlexibleJointRobot
-
-N = 3
-
-
-def numbers(layout: Layout, rng: np.random.Generator) -> dict[str, np.ndarray]:
-    return {f.name: rng.uniform(0, 5, f.shape) + 1e-2 * f.name.endswith("width") for f in layout}
-
-
-def balance(element: AbstractElement, seed: int) -> tuple[float, float, float]:
-    """Return the power through the port, plus the loss, plus the rate of what is stored; the loss; and their size.
-
-    The rate is the derivative of what is stored along the motion of motors and end effector, and of its own state.
-    """
-    rng = np.random.default_rng(seed)
-    m, s = (numbers(layout, rng) for layout in (element.parameters(N), element.inputs()))
-    speed = 10 ** rng.uniform(-6, 1)
-    dq, dtheta = (cs.SX(rng.normal(size=N) * speed) for _ in range(2))
-    velocity, spin = (cs.SX(rng.normal(size=3) * speed) for _ in range(2))
-    own, layout = element.state(N).symbols("own")[0], element.state(N)
-    sizes = {"q": (N, 1), "theta": (N, 1), "position": (3, 1), "rotation": (3, 3)}
-    at = {name: cs.SX.sym(name, *size) for name, size in sizes.items()}
-    state = SimpleNamespace(q=at["q"], theta=at["theta"], dq=dq, dtheta=dtheta)
-    touch = Touch(state, velocity, spin, at["position"], at["rotation"], layout.view(own))
-    effect = element.act(touch, _expressions(s), _expressions(m))
-    places = cs.vertcat(at["q"], at["theta"], at["position"], cs.vec(at["rotation"]), own)
-    turning = at["rotation"] @ cs.skew(spin)
-    moving = cs.vertcat(dq, dtheta, at["rotation"] @ velocity, cs.vec(turning), effect.rate)
-    rate = cs.jtimes(effect.stored, places, moving)
-    given = cs.dot(effect.motor, dtheta) + cs.dot(effect.force, velocity) + cs.dot(effect.moment, spin)
-    there = np.concatenate([rng.normal(size=2 * N + 3), _turned(rng).ravel(), rng.normal(size=layout.size)])
-    f = cs.Function("f", [places], [given, effect.lost, rate])
-    parts = [float(value) for value in f(there)]
-    return sum(parts), parts[1], sum(map(abs, parts))
-
-
-def _turned(rng: np.random.Generator) -> np.ndarray:
-    return Rotation.random(random_state=rng).as_matrix()
-
-
-def _expressions(values: dict[str, np.ndarray]) -> SimpleNamespace:
-    return SimpleNamespace(**{name: cs.SX(value) for name, value in values.items()})
-
-
-def require_honest(element: AbstractElement) -> None:
-    for seed in range(200):
-        left, lost, size = balance(element, seed)
-        assert lost >= 0
-        assert abs(left) <= 1e-13 * size
 
 
 @dataclass(frozen=True)

@@ -177,7 +177,7 @@ def test_an_element_that_stores_and_remembers_keeps_books(way: str) -> None:
     np.testing.assert_allclose(rate[5:-5], run["bumper_velocity"][5:-5], atol=0.05)
     again = Run(run.data)
     assert again.elements == run.elements
-    assert run.elements[-1] == ("bumper", True, True)
+    assert run.elements[-1] == ("bumper", True, True, False)
 
 
 @pytest.mark.parametrize(

@@ -128,7 +128,7 @@ def export_model(
         else:
             cut = export(FlexibleJointRobot.load(what), out)
         for line in cut:
-            console.print(f"note: {line}; the largest is cut to the sum of the others")
+            console.print(f"note: {line}")
         console.print(f"wrote {out}")
     return 0
 

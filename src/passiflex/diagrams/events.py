@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from passiflex.diagrams.panel import Array, Mark, Span
 from passiflex.runs.run import Run
+from passiflex.scenarios.environment import Drag
 from passiflex.scenarios.scenario import Force, Scenario
 
 GOVERNED = ("reference", "stiffness")
@@ -44,7 +45,9 @@ def _forces(scenario: Scenario) -> list[Span]:
     """Return what acts on the end effector, or is exerted by it, for some time."""
     spans = [Span(f.start, f.end, _wrench(f), "force") for f in scenario.forces]
     spans += [Span(f.start, f.end, "feed-forward wrench", "force") for f in scenario.feedforward]
-    return spans + [Span(d.start, d.end, d.kind, "force") for d in scenario.environment]
+    return spans + [
+        Span(d.start, d.end, d.kind, "force") for d in scenario.environment if isinstance(d, Drag)
+    ]
 
 
 def _wrench(force: Force) -> str:

@@ -1,7 +1,8 @@
-"""What touches a robot: elements with one port each, at the motors or at the end effector.
+"""What touches a robot: elements with one port each, at the motors, the links, or the end effector.
 
-An element gives nothing of its own: the power that it gives through its port, what it loses, and the rate of what it
-stores add up to zero, and what it loses is ≥ 0. That is the first test of a new one.
+The power that an element gives through its port, what it loses, and the rate of what it stores add up to what it is
+supplied with from beyond, as by a wall that is moved: nothing for most. What it loses is ≥ 0. That is the first test
+of a new one.
 """
 
 from __future__ import annotations
@@ -11,11 +12,15 @@ from collections.abc import Hashable, Mapping
 from typing import Any, ClassVar, Literal, NamedTuple
 
 import casadi as cs
-from numpy.typing import ArrayLike
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from passiflex.control.motion import Pose
-from passiflex.layout import Layout
+from passiflex.layout import Layout, Signal
 from passiflex.robots.flexible import RobotState
+
+Port = Literal["motors", "links", "end effector"]
+"""Where an element may touch a robot."""
 
 
 class Touch(NamedTuple):
@@ -27,6 +32,7 @@ class Touch(NamedTuple):
     velocity, spin: Of the end effector (3,), in the axes of the last joint, which are those of `Effect`.
     position: Of the end effector, in world axes (3,) [m].
     rotation: From those axes of velocity and force to world axes (3, 3).
+    axes: Of the end effector, as columns in world axes (3, 3).
     own: The element's own state, by name.
     """
 
@@ -35,6 +41,7 @@ class Touch(NamedTuple):
     spin: cs.SX
     position: cs.SX
     rotation: cs.SX
+    axes: cs.SX
     own: Any
 
 
@@ -44,39 +51,63 @@ class Effect(NamedTuple):
     Attributes
     ----------
     motor: Torque on the motors (n,) [N m].
+    link: Torque on the links, beside what acts on the end effector (n,) [N m].
     force, moment: On the end effector (3,) [N, N m].
     lost: [W], ≥ 0.
     stored: [J].
+    supplied: From beyond, through another port of the element [W].
     rate: Of the element's own state, flat.
     """
 
     motor: cs.SX
+    link: cs.SX
     force: cs.SX
     moment: cs.SX
     lost: cs.SX
     stored: cs.SX = cs.SX(0)
+    supplied: cs.SX = cs.SX(0)
     rate: cs.SX = cs.SX(0, 1)
 
 
 def nothing(n: int) -> Effect:
     """Return the effect of no element, of which an element's own differs by what it does."""
-    return Effect(cs.SX.zeros(n), cs.SX.zeros(3), cs.SX.zeros(3), cs.SX(0))
+    return Effect(cs.SX.zeros(n), cs.SX.zeros(n), cs.SX.zeros(3), cs.SX.zeros(3), cs.SX(0))
+
+
+class Mobility(NamedTuple):
+    """How easily a robot is moved where an element may touch it, at its start.
+
+    Attributes
+    ----------
+    tip: Of the end effector, by a force in the direction in which it moves most easily [1/kg].
+    links, motors: Of each link and motor (n,) [1/(kg m²)].
+    """
+
+    tip: float
+    links: NDArray[np.float64]
+    motors: NDArray[np.float64]
 
 
 class Books(NamedTuple):
-    """What a run has of an element: `NAME_energy` lost, `NAME_given_energy` at the end effector, `NAME_storage`.
+    """What a run has of an element: `NAME_energy` lost, `NAME_storage`, and if it is outside `NAME_given_energy`.
 
-    What was lost goes by its `name`, as an energy and as a power; so does what was `given`.
+    What was lost goes by its `name`, as an energy and as a power; so do what was `given`, and what was `supplied`.
     """
 
     name: str
-    at_tip: bool
+    outside: bool
     stores: bool
+    supplies: bool = False
 
     @property
     def given(self) -> str:
         """Return the name of what it gave to the robot."""
         return f"{self.name}_given"
+
+    @property
+    def supplied(self) -> str:
+        """Return the name of what it was supplied with."""
+        return f"{self.name}_supplied"
 
     @property
     def storage(self) -> str:
@@ -86,7 +117,7 @@ class Books(NamedTuple):
     @property
     def signals(self) -> tuple[str, ...]:
         """Return the signals of its balance."""
-        flows = (self.name, self.given) if self.at_tip else (self.name,)
+        flows = (self.name, *[self.given] * self.outside, *[self.supplied] * self.supplies)
         both = (f"{flow}_{kind}" for flow in flows for kind in ("energy", "power"))
         return (*both, self.storage) if self.stores else tuple(both)
 
@@ -100,14 +131,16 @@ class AbstractElement(abc.ABC):
     meaning: What it lost, in words.
     port: Where it touches the robot.
     stores: Whether it can store energy.
+    supplies: Whether it can be supplied with energy from beyond.
     acts: False leaves its arithmetic out, where all its numbers are 0; they stay where they are.
     always: Whether a run has books of it even where it does not act.
-    unknown: What the books of a law miss because of it; empty at the end effector, where it is as a push from outside.
+    unknown: What the books of a law miss because of it; empty outside the robot, where it is as a push.
     """
 
     meaning: ClassVar[str] = "lost in an element of one's own"
-    port: ClassVar[Literal["motors", "end effector"]] = "end effector"
+    port: ClassVar[Port] = "end effector"
     stores: ClassVar[bool] = False
+    supplies: ClassVar[bool] = False
     always: ClassVar[bool] = False
     unknown: ClassVar[str] = ""
     acts: bool = True
@@ -143,14 +176,25 @@ class AbstractElement(abc.ABC):
         return self
 
     @property
-    def at_tip(self) -> bool:
-        """Return whether it touches the end effector."""
-        return self.port == "end effector"
+    def outside(self) -> bool:
+        """Return whether it touches the links, from outside as the law sees it, and not the motors."""
+        return self.port != "motors"
 
     @property
     def books(self) -> Books:
         """Return what a run has of it."""
-        return Books(self.name, self.at_tip, self.stores)
+        return Books(self.name, self.outside, self.stores, self.supplies)
+
+    def rate(self, free: Mobility) -> float:
+        """Return how fast robot and element swing on each other at most [1/s], so that steps resolve it."""
+        return 0.0
+
+    def require_apart(self, at: Pose) -> None:  # noqa: B027 - most have nothing to be within
+        """Raise ValueRangeError if a robot that starts with its end effector at a pose is within it."""
+
+    def seen(self, at: Touch, s: Any, m: Any) -> tuple[Signal, ...]:
+        """Return what else a run has of it: nothing for most."""
+        return ()
 
     @abc.abstractmethod
     def act(self, at: Touch, s: Any, m: Any) -> Effect:

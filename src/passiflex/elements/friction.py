@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, Literal, Protocol, final
+from typing import Any, ClassVar, Protocol, final
 
 import casadi as cs
 import numpy as np
 from numpy.typing import ArrayLike
 
-from passiflex.elements.element import AbstractElement, Effect, Touch, nothing
+from passiflex.elements.element import AbstractElement, Effect, Port, Touch, nothing
 from passiflex.layout import Field, Layout
 
 
@@ -28,7 +28,7 @@ class MotorFriction(AbstractElement):
     """Coulomb and viscous friction of the motors, against θ̇ [N m, N m s/rad], each (n,) or one for all."""
 
     meaning: ClassVar[str] = "lost in the motors' friction"
-    port: ClassVar[Literal["motors", "end effector"]] = "motors"
+    port: ClassVar[Port] = "motors"
     always: ClassVar[bool] = True
     unknown: ClassVar[str] = "friction of the motors"
     acts: bool = True

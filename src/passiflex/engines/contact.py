@@ -20,7 +20,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from passiflex.elements import AbstractElement
+from passiflex.elements.normal import HuntCrossley
+from passiflex.elements.shapes import AbstractShape, Box, Cylinder, Plane, Sphere
+from passiflex.elements.surface import Surface
 from passiflex.engines.mjcf import Piece, quaternion, said
+from passiflex.errors import ValueRangeError
 
 Array = NDArray[np.float64]
 
@@ -38,6 +42,7 @@ class Contact(NamedTuple):
     shape, sizes: Type and size of the geom, as MJCF has them.
     place, axes: Of the geom, in world axes.
     stiffness, damping: K [N/m], B [N s/m], along the normal.
+    crossing: c [s/m] of a damper that grows with the depth, B = c K depth (Hunt and Crossley).
     friction: μ.
     points, roundness: Centres (k, 3) [m] of the hand's spheres, in the axes of the end effector, and their radius [m].
     """
@@ -48,6 +53,7 @@ class Contact(NamedTuple):
     axes: Array
     stiffness: float
     damping: float
+    crossing: float
     friction: float
     points: Array
     roundness: float
@@ -62,6 +68,47 @@ def contact_of(element: AbstractElement, numbers: Mapping[str, Any]) -> Contact 
     return None
 
 
+@contact_of.register
+def _(element: Surface, numbers: Mapping[str, Any]) -> Contact:
+    g = {name: numbers[f"{element.label}_{name}"] for name in MADE if f"{element.label}_{name}" in numbers}
+    if element.moved or float(g["viscous"]):
+        raise ValueRangeError(
+            f"the engine mujoco knows no surface as {element.label!r}",
+            got="one that moves" if element.moved else "viscous friction",
+            needs="one at rest, with dry friction or none",
+            try_="the engine passiflex",
+        )
+    crossing = isinstance(element.normal, HuntCrossley)
+    damping = float(g["damping"])
+    kind, names = SHAPES[type(element.shape)]
+    sizes = [float(numbers[f"{element.label}_{name}"]) for name in names]
+    return Contact(
+        shape=kind,
+        sizes=tuple(min(size, LONGEST) for size in sizes) or (1.0, 1.0, 0.1),
+        place=np.asarray(g["place"]),
+        axes=np.asarray(g["axes"]),
+        stiffness=float(g["stiffness"]),
+        damping=0.0 if crossing else damping,
+        crossing=damping if crossing else 0.0,
+        friction=float(g.get("friction", 0.0)),
+        points=np.reshape(g["points"], (-1, 3)),
+        roundness=float(g["roundness"]),
+    )
+
+
+MADE = ("place", "axes", "stiffness", "damping", "viscous", "friction", "points", "roundness")
+"""What a contact is made of, of the numbers of a surface."""
+SHAPES: dict[type[AbstractShape], tuple[str, tuple[str, ...]]] = {
+    Plane: ("plane", ()),
+    Sphere: ("sphere", ("radius",)),
+    Cylinder: ("cylinder", ("radius", "half_length")),
+    Box: ("box", ("half_x", "half_y", "half_z")),
+}
+"""Shape → type of the geom, and its sizes by their names."""
+LONGEST = 100.0
+"""Size of what has no end [m]."""
+
+
 def surface_geom(name: str) -> str:
     """Return the name of the geom of an element in the world."""
     return f"{name}_surface"
@@ -72,8 +119,13 @@ def hand_geom(name: str, point: int) -> str:
     return f"{name}_hand_{point}"
 
 
-def contact_piece(name: str, contact: Contact) -> Piece:
-    """Return the parts of the model. `stiffen` makes the stiffness of its pairs what it is to be."""
+def contact_piece(name: str, contact: Contact, stiff: Any = None) -> Piece:
+    """Return the parts of a model.
+
+    Parameters
+    ----------
+    stiff: The model of the same parts after `stiffen`, whose factors are written into these; without it they have none.
+    """
     d, mu = IMPEDANCE, contact.friction
     surface = surface_geom(name)
     world = (
@@ -87,13 +139,21 @@ def contact_piece(name: str, contact: Contact) -> Piece:
     )
     pairs = "".join(
         f'<pair name="{hand_geom(name, i)}" geom1="{surface}" geom2="{hand_geom(name, i)}"'
-        f' condim="{3 if mu else 1}" friction="{said([mu, mu, 0, 0, 0])}" solimp="{d} {d} 1 0.5 1"/>'
+        f' condim="{3 if mu else 1}" friction="{said([mu, mu, 0, 0, 0])}" solimp="{d} {d} 1 0.5 1"'
+        f"{_factors(stiff, hand_geom(name, i))}/>"
         for i in range(len(contact.points))
     )
     return Piece(world, tip, f"<contact>{pairs}</contact>")
 
 
-SHARP = 1e-6
+def _factors(stiff: Any, pair: str) -> str:
+    if stiff is None:
+        return ""
+    i = stiff.pair(pair).id
+    return f' solref="{said(stiff.pair_solref[i])}" solreffriction="{said(stiff.pair_solreffriction[i])}"'
+
+
+SHARP = 1e-9
 """Radius of the hand's sphere where it is a point [m]."""
 
 

@@ -131,7 +131,7 @@ class MujocoEngine(AbstractEngine):
         return HeldLoop(loop.plant.rhs, loop.control, watch=loop.watch, mover=plant)
 
 
-def contacts_of(problem: SampledProblem) -> dict[str, Contact]:
+def contacts_of(problem: Problem) -> dict[str, Contact]:
     """Return what MuJoCo makes of the elements of a problem, by their names."""
     numbers = problem.parts.unpack("plant", problem.numbers)
     elements = ((e.name, e.element if isinstance(e, Felt) else e) for e in problem.elements if e.acts)

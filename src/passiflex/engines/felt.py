@@ -5,12 +5,14 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Hashable, Mapping
 from dataclasses import dataclass
+from types import SimpleNamespace
 from typing import Any, ClassVar, final
 
+import casadi as cs
 from numpy.typing import ArrayLike
 
-from passiflex.elements import AbstractElement, Effect, Touch, nothing
-from passiflex.layout import Field, Layout
+from passiflex.elements import AbstractElement, Effect, Mobility, Touch, nothing
+from passiflex.layout import Field, Layout, Signal
 from passiflex.problems.problem import SampledProblem
 
 FELT = ("wrench", "lost", "stored")
@@ -64,12 +66,23 @@ class Felt(AbstractElement):
             )
         )
 
+    def rate(self, free: Mobility) -> float:
+        """Return how fast robot and element swing on each other."""
+        return self.element.rate(free)
+
+    def seen(self, at: Touch, s: Any, m: Any) -> tuple[Signal, ...]:
+        """Return what is to be seen of the element, with the force that is felt."""
+        force = getattr(at.own, f"{self.name}_wrench")[:3]
+        nothing_bent = {f.name: cs.SX.zeros(*f.shape) for f in self.element.state(at.x.q.numel())}
+        seen = self.element.seen(at._replace(own=SimpleNamespace(**nothing_bent)), s, m)
+        return tuple(v._replace(value=force) if v.field.name == f"{self.name}_force" else v for v in seen)
+
     def act(self, at: Touch, s: Any, m: Any) -> Effect:
         """Return what its state says."""
         wrench, lost, stored = (getattr(at.own, f"{self.name}_{part}") for part in FELT)
         force, moment = (at.rotation.T @ half for half in (wrench[:3], wrench[3:]))
         none = nothing(at.x.q.numel())
-        rate = type(lost).zeros(self.state(none.motor.numel()).size)
+        rate = cs.SX.zeros(self.state(none.motor.numel()).size)
         return none._replace(force=force, moment=moment, lost=lost, stored=stored, rate=rate)
 
 

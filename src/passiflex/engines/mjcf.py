@@ -94,7 +94,7 @@ def mjcf(
     tip = f'pos="{said(numbers["tool_position"])}" quat="{quaternion(numbers["tool_rotation"])}"'
     out += [
         f'<site name="tip" {tip} size="{DOT}"/>',
-        *[f'<body name="hand" {tip}>{piece.tip}</body>' for piece in pieces if piece.tip],
+        f'<body name="hand" {tip}>{"".join(piece.tip for piece in pieces)}</body>',
         "</body>" * chain.n,
         *(piece.world for piece in pieces),
         "</worldbody>",

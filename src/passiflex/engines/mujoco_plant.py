@@ -142,6 +142,8 @@ class MujocoPlant:
             moving = self._stages[stage]
             moving[: 2 * n], moving[2 * n :] = self._where, self._speed
             self._stage = stage + 1
+        if self._touching is not None and self._touching.crosses:
+            self._touching.cross()
         if self._acts:
             push = self._moved.push
             push.inputs[0][: 2 * n], push.inputs[0][2 * n :] = self._where, self._speed

@@ -37,7 +37,7 @@ class Touching:
         self._mujoco = mujoco_module()
         self._model, self._data = model, data
         self._of = {
-            model.geom(hand_geom(name, i)).id: (name, contact.stiffness)
+            model.geom(hand_geom(name, i)).id: (name, contact.stiffness, contact.crossing)
             for name, contact in contacts.items()
             for i in range(len(contact.points))
         }
@@ -48,8 +48,20 @@ class Touching:
             passed = (energies[flow] for flow in (books[name].given, books[name].name))
             sums = [slice(begin + at.start, begin + at.stop) for at in passed]
             self._at[name] = _Where(*(state[f"{name}_{part}"] for part in FELT), *sums)
+        self.crosses = any(contact.crossing for contact in contacts.values())
         self._external = begin + energies["external"].start
         self._tip, self._force = model.site("tip").id, np.zeros(6)
+
+    def cross(self) -> None:
+        """Make the dampers of contacts grow with their depth, for this evaluation of MuJoCo's forces."""
+        data = self._data
+        for i in range(data.ncon):
+            contact = data.contact[i]
+            first, second = contact.geom.tolist()
+            crossing = self._of[second if second in self._of else first][2]
+            if crossing and contact.efc_address >= 0:
+                k, _, d, _ = factors = data.efc_KBIP[contact.efc_address]
+                factors[1] = k * d * crossing * max(0.0, -contact.dist)
 
     def feel(self, y: Array, given: float) -> None:
         """Write what is felt now, after the contacts gave so much energy to the links since it was written last [J].
@@ -81,7 +93,7 @@ class Touching:
             return
         first, second = contact.geom.tolist()
         hand = second if second in self._of else first
-        name, stiffness = self._of[hand]
+        name, stiffness, _ = self._of[hand]
         at = self._at[name]
         self._mujoco.mj_contactForce(self._model, data, i, force)
         fx, fy, fz = pushed = (force[:3] if hand == second else -force[:3]) @ contact.frame.reshape(3, 3)

@@ -9,7 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from passiflex.engines.contact import contact_piece
+from passiflex.engines.engine import contacts_of
 from passiflex.engines.mjcf import RK4, Options, cut_inertias, mjcf
+from passiflex.engines.mujoco_model import mujoco_model
 from passiflex.files import OutputError, whole_file
 from passiflex.loops.plant import Plant
 from passiflex.native import NativeFunction, fastest_pole
@@ -24,8 +27,9 @@ ENDING = ".xml"
 def export_model(what: FlexibleJointRobot | Problem, path: str | Path) -> list[str]:
     """Write the MJCF of a robot, or of the plant of a problem with its tool, payload and deviations and its start.
 
-    Return a line on each link whose inertia no body has, and that MuJoCo's compiler would refuse: there the largest
-    principal moment is cut to the sum of the others. `simulate` with the engine mujoco runs on the exact ones.
+    Return a line on each thing that is not in the file as it is: the inertia of a link that no body has, whose largest
+    principal moment is cut to the sum of the others, as MuJoCo's compiler refuses it; and a damper that grows with the
+    depth of a contact. `simulate` with the engine mujoco has both.
 
     Raises
     ------
@@ -42,16 +46,25 @@ def export_model(what: FlexibleJointRobot | Problem, path: str | Path) -> list[s
 
 
 def model_text(what: FlexibleJointRobot | Problem) -> tuple[str, list[str]]:
-    """Return the text of the file, and a line on each inertia that was cut."""
+    """Return the text of the file, and the lines of `export_model`."""
+    undamped: list[str] = []
     if isinstance(what, Problem):
         robot = what.law.robot
         numbers = robot.layout.unpack(what.plant[: robot.layout.size])
         start = what.q, what.theta
-        text = mjcf(robot, numbers, Options(_step(robot, numbers, what.q), RK4), start=start)
+        contacts = contacts_of(what)
+        options = Options(_step(robot, numbers, what.q), RK4, contact=bool(contacts))
+        stiff = mujoco_model(robot, numbers, options, contacts) if contacts else None
+        pieces = [contact_piece(name, contact, stiff) for name, contact in contacts.items()]
+        text = mjcf(robot, numbers, options, pieces, start)
+        undamped = [name for name, contact in contacts.items() if contact.crossing]
     else:
         robot, numbers = what, what.nominal()
         text = mjcf(robot, numbers, Options(_step(robot, numbers, np.zeros(robot.n)), RK4))
-    return text, cut_inertias(robot, numbers)
+    remarks = [
+        f"{line}; the largest is cut to the sum of the others" for line in cut_inertias(robot, numbers)
+    ]
+    return text, remarks + [f"the damper of {name!r} is left out" for name in undamped]
 
 
 def _step(robot: FlexibleJointRobot, numbers: Mapping[str, Any], q: NDArray[np.float64]) -> float:

@@ -157,6 +157,7 @@ class ClosedLoop:
             outer_torque(robot, command),
             true.wrench,
             *true.energies,
+            *true.touched,
             *claimed_energies(command, carried, "x_d"),
         )
 

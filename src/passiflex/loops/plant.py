@@ -41,7 +41,7 @@ class Flow(NamedTuple):
 
 
 class Truth(NamedTuple):
-    """What is true at one instant; `energies` are what robot and elements store."""
+    """What is true at one instant; `energies` are what robot and elements store, `touched` what else is seen."""
 
     position: Signal
     rotation: Signal
@@ -49,12 +49,20 @@ class Truth(NamedTuple):
     tau_e: Signal
     wrench: Signal
     energies: tuple[Signal, ...]
+    touched: tuple[Signal, ...] = ()
 
     @property
     def signals(self) -> tuple[Signal, ...]:
         """Return all of them, in the order of files."""
-        *single, energies = self
-        return (*single, *energies)
+        *single, energies, touched = self
+        return (*single, *energies, *touched)
+
+
+class Pushed(NamedTuple):
+    """What acts on the links from outside: on the end effector, in world axes (6,), and as joint torque τ_e (n,)."""
+
+    wrench: cs.SX
+    tau_e: cs.SX
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,8 +101,11 @@ class Plant:
     def energies(self) -> Layout:
         """Return what is summed up over time."""
         lost = tuple(Field(e.name, (), "J", e.meaning) for e in self.booked)
-        given = tuple(Field(e.books.given, (), "J", "given to the robot") for e in self.booked if e.at_tip)
-        return Layout(PORTS + lost + given)
+        given = tuple(Field(e.books.given, (), "J", "given to the robot") for e in self.booked if e.outside)
+        supplied = tuple(
+            Field(e.books.supplied, (), "J", "supplied to it from beyond") for e in self.booked if e.supplies
+        )
+        return Layout(PORTS + lost + given + supplied)
 
     @cached_property
     def state(self) -> Layout:
@@ -126,10 +137,12 @@ class Plant:
         touched = _sum(effects, self.robot.n)
         given = TipWrench(*(arm.in_tip_axes(robot.q, half) for half in cs.vertsplit(s.F_e, 3)))
         pushed = TipWrench(given.force + touched.force, given.moment + touched.moment)
-        a = self.robot.acceleration(robot, tau_m + touched.motor, pushed, m)
+        a = self.robot.acceleration(robot, tau_m + touched.motor, pushed, m, touched.link)
         stretch = robot.dtheta - robot.dq
         powers = {
-            "external": cs.dot(pushed.force, at.velocity) + cs.dot(pushed.moment, at.spin),
+            "external": cs.dot(pushed.force, at.velocity)
+            + cs.dot(pushed.moment, at.spin)
+            + cs.dot(touched.link, robot.dq),
             "motor": cs.dot(tau_m, robot.dtheta),
             "joint": cs.dot(a.tau_a, robot.dq),
             "joint_loss": cs.dot(stretch, m.joint_damping * stretch),
@@ -139,6 +152,7 @@ class Plant:
             if element in self.booked:
                 powers[element.name] = effect.lost
                 powers[element.books.given] = given_by(effect, at)
+                powers[element.books.supplied] = effect.supplied
             rate |= vars(element.state(self.robot.n).view(effect.rate))
         return Flow(rate, {f.name: powers[f.name] for f in self.energies})
 
@@ -146,32 +160,42 @@ class Plant:
         arm, robot = self.robot.arm, self.view(x)
         velocity, spin = arm.tip_velocity(robot.q, robot.dq, m)
         axes = cs.horzcat(*(arm.in_world_axes(robot.q, axis) for axis in cs.horzsplit(cs.SX.eye(3))))
-        return Touch(robot, velocity, spin, arm.pose(robot.q, m).position, axes, own=SimpleNamespace())
+        pose = arm.pose(robot.q, m)
+        return Touch(robot, velocity, spin, pose.position, axes, pose.rotation, own=SimpleNamespace())
+
+    def _own(self, element: AbstractElement, at: Touch, x: cs.SX) -> Touch:
+        """Return the touch as an element takes it: with its own state."""
+        layout = element.state(self.robot.n)
+        return at._replace(
+            own=SimpleNamespace(**{f.name: getattr(self.state.view(x), f.name) for f in layout})
+        )
 
     def _effects(self, at: Touch, x: cs.SX, s: Any, m: Any) -> list[Effect]:
         effects = []
         for element in self.elements:
-            layout = element.state(self.robot.n)
-            own = SimpleNamespace(**{f.name: getattr(self.state.view(x), f.name) for f in layout})
-            acting = element.act(at._replace(own=own), s, m) if element.acts else nothing(self.robot.n)
+            acting = element.act(self._own(element, at, x), s, m) if element.acts else nothing(self.robot.n)
             effects.append(acting)
         return effects
 
-    def wrench(self, x: cs.SX, s: Any, m: Any) -> cs.SX:
-        """Return all that acts on the end effector, in world axes (6,)."""
-        return self._world_wrench(_sum(self._effects(self._touch(x, m), x, s, m), self.robot.n), x, s)
+    def pushed(self, x: cs.SX, s: Any, m: Any) -> Pushed:
+        """Return all that acts on the links from outside."""
+        touched = _sum(self._effects(self._touch(x, m), x, s, m), self.robot.n)
+        return self._pushed(touched, x, s, m)
+
+    def _pushed(self, touched: Effect, x: cs.SX, s: Any, m: Any) -> Pushed:
+        wrench = self._world_wrench(touched, x, s)
+        return Pushed(wrench, self.robot.arm.jacobian(self.view(x).q, m).T @ wrench + touched.link)
 
     def sense(self, x: cs.SX, s: Any, m: Any) -> Measurement:
         """Return what there is to be measured of the state x."""
-        robot, wrench = self.view(x), self.wrench(x, s, m)
-        tau_a = self.robot.joint_torque(robot, m)
-        return Measurement(*robot, tau_a, wrench, self.robot.arm.jacobian(robot.q, m).T @ wrench)
+        robot, pushed = self.view(x), self.pushed(x, s, m)
+        return Measurement(*robot, self.robot.joint_torque(robot, m), *pushed)
 
     def touched(self, x: cs.SX, s: Any, m: Any) -> tuple[cs.SX, cs.SX]:
         """Return what the elements do to the links and to the motors (n,) [N m]; F_e comes beside it."""
         robot, effect = self.view(x), _sum(self._effects(self._touch(x, m), x, s, m), self.robot.n)
         parts = (self.robot.arm.in_world_axes(robot.q, part) for part in (effect.force, effect.moment))
-        return self.robot.arm.jacobian(robot.q, m).T @ cs.vertcat(*parts), effect.motor
+        return self.robot.arm.jacobian(robot.q, m).T @ cs.vertcat(*parts) + effect.link, effect.motor
 
     def _world_wrench(self, touched: Effect, x: cs.SX, s: Any) -> cs.SX:
         parts = (
@@ -183,9 +207,10 @@ class Plant:
         """Return what is true at one instant."""
         arm, robot, n = self.robot.arm, self.view(x), self.robot.n
         torque, across = arm.chain.joint_units[2], ("axis", "column")
-        effects = self._effects(self._touch(x, m), x, s, m)
-        wrench, pose = self._world_wrench(_sum(effects, n), x, s), arm.pose(robot.q, m)
-        tau_a, tau_e = self.robot.joint_torque(robot, m), arm.jacobian(robot.q, m).T @ wrench
+        at = self._touch(x, m)
+        effects = self._effects(at, x, s, m)
+        wrench, tau_e = self._pushed(_sum(effects, n), x, s, m)
+        pose, tau_a = arm.pose(robot.q, m), self.robot.joint_torque(robot, m)
         return Truth(
             position=Signal(Field("position", (3,), "m", "end effector", axes=("axis",)), pose.position),
             rotation=Signal(
@@ -199,6 +224,9 @@ class Plant:
                 Field("wrench", (6,), "N, N m", "all on the end effector", axes=("component",)), wrench
             ),
             energies=self._energies(robot, effects, m),
+            touched=tuple(
+                signal for e in self.elements if e.acts for signal in e.seen(self._own(e, at, x), s, m)
+            ),
         )
 
     def _energies(self, x: RobotState, effects: list[Effect], m: Any) -> tuple[Signal, ...]:
@@ -237,13 +265,11 @@ class Plant:
 def given_by(effect: Effect, at: Touch) -> cs.SX:
     """Return the power that an element gives to the robot [W]."""
     at_tip = cs.dot(effect.force, at.velocity) + cs.dot(effect.moment, at.spin)
-    return cs.dot(effect.motor, at.x.dtheta) + at_tip
+    return cs.dot(effect.motor, at.x.dtheta) + cs.dot(effect.link, at.x.dq) + at_tip
 
 
 def _sum(effects: list[Effect], n: int) -> Effect:
     """Return what all of them do to the robot."""
-    none = nothing(n)
-    motor, force, moment = (
-        sum((getattr(e, part) for e in effects), getattr(none, part)) for part in ("motor", "force", "moment")
-    )
-    return none._replace(motor=motor, force=force, moment=moment)
+    none, acting = nothing(n), ("motor", "link", "force", "moment")
+    parts = {part: sum((getattr(e, part) for e in effects), getattr(none, part)) for part in acting}
+    return none._replace(**parts)

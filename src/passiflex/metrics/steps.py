@@ -31,8 +31,9 @@ def step_window(scenario: Scenario) -> StepWindow | None:
     times = [e.at for e in scenario.reference] + [
         t for c in scenario.gain_changes for t in (c.at, c.at + c.duration)
     ]
-    for entries in (scenario.forces, scenario.feedforward, scenario.environment):
+    for entries in (scenario.forces, scenario.feedforward):
         times += [t for entry in entries for t in (entry.start, entry.end)]
+    times += [t for entry in scenario.environment for t in entry.lasts]
     size = float(np.linalg.norm(step.by))
     end = min([t for t in times if t > step.at] + [scenario.duration])
     return StepWindow(size, np.array(step.by) / size, step.at, end)

@@ -83,7 +83,7 @@ def audit(run: Signals) -> Audit:
     if not hasattr(run, "unbooked"):
         raise ArgumentError(run, "a run, as simulate returns", "Run.load for a file")
     balances: tuple[Balance, ...] = robot_balance(run), link_balance(run), claimed_balance(run)
-    if any(e.at_tip for e in run.elements):
+    if any(e.outside for e in run.elements):
         balances = (*balances, environment_balance(run))
     found = extremes(run)
     verdict, time, term, remedy = _judged(run, found, readable=_readable(run, balances[1]))

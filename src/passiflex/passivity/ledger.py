@@ -96,7 +96,7 @@ class Balance:
 
 def robot_balance(run: Signals) -> Balance:
     """Return the balance of the real robot, (3)–(4): true whatever the law; its residual is the integrator's."""
-    own = [e for e in run.elements if not e.at_tip]
+    own = [e for e in run.elements if not e.outside]
     return Balance.of(
         run,
         "robot",
@@ -113,19 +113,28 @@ def robot_balance(run: Signals) -> Balance:
 
 
 def environment_balance(run: Signals) -> Balance:
-    """Return the balance of what touches the end effector: what it gives to the robot it had, or lost less.
+    """Return the balance of what touches the robot from outside: what it gives it had, lost less, or was supplied with.
 
     Pushes of the scenario are no part of it: they give whatever they are told to.
     """
-    there = [e for e in run.elements if e.at_tip]
+    there = [e for e in run.elements if e.outside]
     stored = {e.name: run[e.storage] for e in there if e.stores}
+
+    def supplied(kind: str) -> dict[str, Array]:
+        robot = {f"{e.name}, from the robot": -run[f"{e.given}_{kind}"] for e in there}
+        beyond = {f"{e.name}, from beyond": run[f"{e.supplied}_{kind}"] for e in there if e.supplies}
+        return robot | beyond
+
+    def lost(kind: str) -> dict[str, Array]:
+        return {f"{e.name}, lost": run[f"{e.name}_{kind}"] for e in there}
+
     return Balance(
         "environment",
         stored or {"nothing stored": np.zeros_like(run["external_energy"])},
-        {f"{e.name}, from the robot": -run[f"{e.given}_energy"] for e in there},
-        {f"{e.name}, lost": run[f"{e.name}_energy"] for e in there},
-        {f"{e.name}, from the robot": -run[f"{e.given}_power"] for e in there},
-        {f"{e.name}, lost": run[f"{e.name}_power"] for e in there},
+        supplied("energy"),
+        lost("energy"),
+        supplied("power"),
+        lost("power"),
     )
 
 

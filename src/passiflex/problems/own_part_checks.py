@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, get_args
 
 import casadi as cs
 import numpy as np
@@ -15,11 +15,12 @@ from scipy.spatial.transform import Rotation
 from passiflex.control.law import AbstractLaw
 from passiflex.control.motion import MOTION, Pose
 from passiflex.control.signals import Measurement, Reference
-from passiflex.elements import AbstractElement, Effect, Touch
+from passiflex.elements import AbstractElement, Effect, Port, Touch
 from passiflex.errors import PassiflexError, PassiflexWarning, SizeError, ValueRangeError
 from passiflex.layout import Layout
 from passiflex.loops.plant import given_by
 from passiflex.problems.problem import Problem
+from passiflex.problems.unbooked import listed
 from passiflex.robots.arm import EndEffectorPose
 from passiflex.robots.flexible import RobotState
 from passiflex.sampled.sensors import AbstractSensorEffect
@@ -38,7 +39,7 @@ OWN_CHANGE = 0.1
 """How far an element's own state is from that at rest, in its units."""
 PLACE = 0.05
 """How far joints and reference are from the start, in their units."""
-PORTS = ("motors", "end effector")
+PORTS = get_args(Port)
 
 
 @contextmanager
@@ -64,7 +65,9 @@ def check_element(element: AbstractElement, n: int) -> None:
     """
     who = type(element).__name__
     if element.port not in PORTS:
-        raise ValueRangeError(f"{who}.port", got=repr(element.port), needs=" or ".join(map(repr, PORTS)))
+        raise ValueRangeError(
+            f"{who}.port", got=repr(element.port), needs=listed([repr(port) for port in PORTS], "or")
+        )
     if not element.name.isidentifier():
         needs = "letters, digits and _, as signals are called by it"
         raise ValueRangeError(f"{who}.name", got=repr(element.name), needs=needs)
@@ -74,16 +77,20 @@ def check_element(element: AbstractElement, n: int) -> None:
     with saying(element, "act", "an Effect, made by nothing(n)._replace(...)"):
         effect = element.act(at, Layout(()).view(cs.SX(0, 1)), m)
         effect = Effect(*(cs.SX(part) for part in effect))
-    sizes = {"motor": n, "force": 3, "moment": 3, "lost": 1, "stored": 1, "rate": element.state(n).size}
+    ones = dict.fromkeys(("lost", "stored", "supplied"), 1)
+    sizes = {"motor": n, "link": n, "force": 3, "moment": 3, **ones, "rate": element.state(n).size}
     for name, size in sizes.items():
         if (got := getattr(effect, name).numel()) != size:
             raise SizeError(f"{who}.act: {name} of its effect", got=f"{got} numbers", needs=f"{size}")
-    elsewhere = (effect.force, effect.moment) if element.port == "motors" else (effect.motor,)
-    if not all(part.is_zero() for part in elsewhere):
-        needs = '`port` says where, "motors" or "end effector": its books are kept there'
+    at_port = {"motors": ("motor",), "links": ("link",), "end effector": ("force", "moment")}
+    elsewhere = {part for parts in at_port.values() for part in parts} - set(at_port[element.port])
+    if not all(getattr(effect, part).is_zero() for part in elsewhere):
+        needs = f"`port` says where, {listed([repr(port) for port in PORTS], 'or')}: its books are kept there"
         raise ValueRangeError(f"an element touches more than the {element.port}", got=who, needs=needs)
     if not element.stores and not effect.stored.is_zero():
         raise ValueRangeError("an element stores energy", got=who, needs="stores = True, for its books")
+    if not element.supplies and not effect.supplied.is_zero():
+        raise ValueRangeError("an element is supplied", got=who, needs="supplies = True, for its books")
     _warn_of_gifts(element, n, symbols, at, effect)
 
 
@@ -91,11 +98,11 @@ def _touch(element: AbstractElement, n: int) -> tuple[list[cs.SX], Touch, Any]:
     """Return the symbols of what may touch a robot: its motion, the element's state, and the parameters."""
     x = RobotState(*(cs.SX.sym(name, n) for name in RobotState._fields))
     velocity, spin, position = (cs.SX.sym(name, 3) for name in ("velocity", "spin", "position"))
-    rotation = cs.SX.sym("rotation", 3, 3)
+    rotation, axes = cs.SX.sym("rotation", 3, 3), cs.SX.sym("axes", 3, 3)
     own_vector, own = element.state(n).symbols("own")
     p, m = element.parameters(n).symbols("m")
-    symbols = [*x, velocity, spin, position, rotation, own_vector, p]
-    return symbols, Touch(x, velocity, spin, position, rotation, own), m
+    symbols = [*x, velocity, spin, position, rotation, axes, own_vector, p]
+    return symbols, Touch(x, velocity, spin, position, rotation, axes, own), m
 
 
 def _warn_of_gifts(element: AbstractElement, n: int, symbols: list[cs.SX], at: Touch, effect: Effect) -> None:
@@ -104,16 +111,17 @@ def _warn_of_gifts(element: AbstractElement, n: int, symbols: list[cs.SX], at: T
     What it stores can be followed where it does not depend on velocities, as no acceleration is known.
     """
     given = given_by(effect, at)
-    sizes = cs.fabs(effect.lost) + cs.fabs(given)
-    f = cs.Function("element", symbols, [effect.lost, given + effect.lost + _storing(symbols, effect), sizes])
+    sizes = cs.fabs(effect.lost) + cs.fabs(given) + cs.fabs(effect.supplied)
+    left = given + effect.lost + _storing(symbols, effect) - effect.supplied
+    f = cs.Function("element", symbols, [effect.lost, left, sizes])
     numbers = element.parameters(n).pack(dict(element.numbers(n)))
     start = element.state(n).pack(dict(element.start(Pose(np.zeros(3), np.eye(3)), n)))
     rng, least, gift = np.random.default_rng(0), 0.0, 0.0
     for _ in range(TRIES):
         moved = [rng.normal(0, SPEED, size=size) for size in (n, n, n, n, 3, 3, 3)]
-        turn = Rotation.random(random_state=rng).as_matrix()
+        turn, axes = (Rotation.random(random_state=rng).as_matrix() for _ in range(2))
         own = start + rng.normal(0, OWN_CHANGE, start.size)
-        lost, left, size = (float(v) for v in f(*moved, turn, own, numbers))
+        lost, left, size = (float(v) for v in f(*moved, turn, axes, own, numbers))
         if size > 0 and np.isfinite(lost):
             least = min(least, lost / size)
         if size > 0 and np.isfinite(left):
@@ -127,10 +135,11 @@ def _warn_of_gifts(element: AbstractElement, n: int, symbols: list[cs.SX], at: T
 
 def _storing(symbols: list[cs.SX], effect: Effect) -> cs.SX:
     """Return the rate of what an element stores [W]; no number where it cannot be followed."""
-    q, theta, dq, dtheta, velocity, spin, position, rotation, own, _ = symbols
+    q, theta, dq, dtheta, velocity, spin, position, rotation, axes, own, _ = symbols
     if cs.depends_on(effect.stored, cs.vertcat(dq, dtheta, velocity, spin)):
         return cs.SX(cs.nan)
     along = [(q, dq), (theta, dtheta), (position, rotation @ velocity), (rotation, rotation @ cs.skew(spin))]
+    along.append((axes, cs.skew(rotation @ spin) @ axes))
     along += [(own, effect.rate)] if own.numel() else []
     return sum((cs.jtimes(effect.stored, place, rate) for place, rate in along), cs.SX(0))
 

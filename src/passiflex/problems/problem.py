@@ -23,7 +23,7 @@ from passiflex.sampled.controller import SampledController
 from passiflex.sampled.sensors import AbstractSensorEffect
 
 Array = NDArray[np.float64]
-NOTHING: Mapping[str, float] = MappingProxyType({})
+NOTHING: Mapping[str, ArrayLike] = MappingProxyType({})
 
 
 class Event(NamedTuple):
@@ -35,7 +35,7 @@ class Event(NamedTuple):
     time: float
     motion: Motion | None
     F_e: Array
-    inputs: Mapping[str, float] = NOTHING
+    inputs: Mapping[str, ArrayLike] = NOTHING
 
     @property
     def environment(self) -> dict[str, Any]:

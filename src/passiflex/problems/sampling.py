@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from passiflex.control.law import AbstractLaw
+from passiflex.control.motion import Pose
 from passiflex.control.posture import Posture
 from passiflex.control.tank import NO_CAP
 from passiflex.elements import MotorFriction
@@ -22,6 +23,7 @@ from passiflex.sampled.measurement_bound import BEND
 from passiflex.sampled.motors import UNLIMITED_TORQUE
 from passiflex.sampled.sensors import UNFILTERED
 from passiflex.scenarios.control_settings import Actions, Control, MotorSettings, SensorSettings
+from passiflex.scenarios.environment import labelled
 from passiflex.scenarios.noise_settings import Noise
 from passiflex.scenarios.scenario import Scenario
 from passiflex.scenarios.tank_settings import TankSettings
@@ -108,13 +110,17 @@ def sampled_parts(
     }
 
 
-def elements_of(scenario: Scenario, robot: FlexibleJointRobot) -> Elements:
-    """Return what touches a scenario's robot: each kind once, friction first, whose books a sampled run always has.
+def elements_of(scenario: Scenario, robot: FlexibleJointRobot, at: Pose) -> Elements:
+    """Return what touches a scenario's robot: friction first, whose books a sampled run always has; all drags are one.
+
+    Parameters
+    ----------
+    at: Where the end effector starts.
 
     Raises
     ------
-    SizeError
-        For friction of another number of joints.
+    SizeError, ValueRangeError
+        For friction of another number of joints, or an element that the robot is within at the start.
     """
     motors = scenario.motors or MotorSettings()
     coulomb, viscous = (
@@ -123,7 +129,10 @@ def elements_of(scenario: Scenario, robot: FlexibleJointRobot) -> Elements:
     )
     rubs = bool(np.any(coulomb) or np.any(viscous))
     friction = MotorFriction(rubs, coulomb, viscous, motors.friction_width)
-    others = {e.structure: e for e in (s.build() for s in scenario.environment if s.acts)}
+    entries = labelled(scenario.environment).items()
+    others = {e.structure: e for e in (entry.build(name, at, scenario.hand) for name, entry in entries)}
+    for element in others.values():
+        element.require_apart(at)
     return (*[friction] * (rubs or scenario.control is not None), *others.values())
 
 

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from passiflex.control.motion import Motion, Pose, hold, pose_at, rebased
 from passiflex.problems.problem import Event
+from passiflex.scenarios.environment import labelled
 from passiflex.scenarios.reference import AbstractReferenceEvent
 from passiflex.scenarios.scenario import Scenario
+from passiflex.scenarios.touching import Change
 
 Array = NDArray[np.float64]
 
@@ -20,17 +24,25 @@ def timeline(scenario: Scenario, home: Pose) -> tuple[Event, ...]:
     """Return the events in the order of time: each change of the reference or of what acts on the robot is one."""
     motions = _motions(scenario, home)
     wrenches = _summed([(f.start, f.end, (*f.force, *f.moment)) for f in scenario.forces])
-    touching = [entry for entry in scenario.environment if entry.acts]
-    names = sorted({name for entry in touching for name in entry.inputs})
-    lasting = [(e.start, e.end, tuple(e.inputs.get(n, 0.0) for n in names)) for e in touching]
-    inputs = _summed(lasting)
-    times = {t for changes in (wrenches, inputs) for t in changes if t < scenario.duration}
-    acting, felt, events = np.zeros(6), np.zeros(len(names)), []
-    for time in sorted({0.0, *motions, *times}):
-        acting, felt = wrenches.get(time, acting), inputs.get(time, felt)
-        named = {name: float(value) for name, value in zip(names, felt, strict=True)}
-        events.append(Event(time, motions.get(time), acting.copy(), named))
+    felt = [entry.changes(label) for label, entry in labelled(scenario.environment).items()]
+    changing = {change.time for changes in felt for change in changes} | wrenches.keys()
+    acting, events = np.zeros(6), []
+    for time in sorted({0.0, *motions, *(t for t in changing if t < scenario.duration)}):
+        acting = wrenches.get(time, acting)
+        events.append(Event(time, motions.get(time), acting.copy(), _felt(felt, time)))
     return tuple(events)
+
+
+def _felt(entries: Sequence[Sequence[Change]], time: float) -> dict[str, Any]:
+    """Return the inputs of what touches the robot: those of one name add up, to a sum that is rounded once."""
+    found: dict[str, list[Any]] = {}
+    for changes in entries:
+        in_force = next((change for change in reversed(changes) if change.time <= time), None)
+        for name, value in (in_force.inputs if in_force else {}).items():
+            found.setdefault(name, []).append(value)
+    return {
+        name: values[0] if len(values) == 1 else math.fsum(values) for name, values in sorted(found.items())
+    }
 
 
 def _motions(scenario: Scenario, home: Pose) -> dict[float, Motion]:

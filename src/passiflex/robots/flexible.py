@@ -134,17 +134,23 @@ class FlexibleJointRobot:
         return m.joint_stiffness * (x.theta - x.q) + m.joint_damping * (x.dtheta - x.dq)
 
     def acceleration(
-        self, x: RobotState, tau_m: cs.SX, external: cs.SX | TipWrench, m: RobotNumbers
+        self,
+        x: RobotState,
+        tau_m: cs.SX,
+        external: cs.SX | TipWrench,
+        m: RobotNumbers,
+        beside: cs.SX | float = 0,
     ) -> Acceleration:
         """Return q̈, θ̈ of (2) under the motor torque τ_m [N m] and what acts from outside.
 
         Parameters
         ----------
         external: The joint torque τ_e (n,) [N m]; or the wrench on the end effector that makes it, which is cheaper.
+        beside: Joint torque that acts on the links beside it (n,) [N m].
         """
         tau_a, arm = self.joint_torque(x, m), self.arm
         at_tip = external if isinstance(external, TipWrench) else None
-        driving = tau_a - arm.bias_torque(x.q, x.dq, m, at_tip) + (0 if at_tip else external)
+        driving = tau_a - arm.bias_torque(x.q, x.dq, m, at_tip) + (0 if at_tip else external) + beside
         ddq = solve_spd(arm.mass_matrix(x.q, m), driving)
         return Acceleration(ddq, (tau_m - tau_a) / m.motor_inertia, tau_a)
 

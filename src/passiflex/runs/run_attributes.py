@@ -35,12 +35,12 @@ def _mapping(text: str) -> str:
 
 
 def _elements(text: str) -> str:
-    """Return the text if it is a list of [name, whether at the end effector, whether it stores energy]."""
+    """Return the text if it is a list of [name, whether outside, whether it stores energy, and is supplied with it]."""
     for entry in read_json(_json(text, list)):
         kinds = [type(part) for part in entry] if isinstance(entry, list) else []
-        if kinds != [str, bool, bool]:
+        if kinds not in ([str, bool, bool], [str, bool, bool, bool]):
             raise ValueError(
-                "expected a list of name, whether at the end effector, and whether it stores energy"
+                "expected a list of name, whether outside the robot, whether it stores energy, and is supplied with it"
             )
     return text
 

@@ -1,28 +1,32 @@
-"""What touches the end effector in a scenario, beside constant wrenches."""
+"""What touches the end effector in a scenario, beside wrenches."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field
 
 from passiflex.scenarios.spans import TimeSpan
+from passiflex.scenarios.surface_settings import Box, Cylinder, Plane, Sphere
+from passiflex.scenarios.touching import KINDS, AbstractTouching, Change, Hand
 from passiflex.texts.quantity import Quantity
+from passiflex.texts.section import Mistakes
 
 if TYPE_CHECKING:  # who reads a scenario needs no CasADi
+    from passiflex.control.motion import Pose
     from passiflex.elements import AbstractElement
 
 
-class Drag(TimeSpan):
+class Drag(TimeSpan, AbstractTouching):
     """The end effector moves through something that takes energy out, as in polishing."""
 
-    kind: Literal["drag"] = Field(description="drag")
+    kind: Literal["drag"] = Field(description=KINDS)
     viscous: Annotated[float, Quantity("N s/m", least=0)] = Field(default=0.0, description="N s/m")
     dry: Annotated[float, Quantity("N", least=0)] = Field(default=0.0, description="against the motion, N")
 
-    def build(self) -> AbstractElement:
-        """Return the element."""
+    def build(self, label: str, at: Pose, hand: Hand) -> AbstractElement:
+        """Return the element; all drags are one."""
         from passiflex.elements import Drag
 
         return Drag()
@@ -30,16 +34,37 @@ class Drag(TimeSpan):
     @property
     def acts(self) -> bool:
         """Return whether it does anything."""
-        return any(self.inputs.values())
+        return bool(self.viscous or self.dry)
 
-    @property
-    def inputs(self) -> dict[str, float]:
-        """Return the inputs of the element while it lasts."""
-        return {"viscous_drag": self.viscous, "dry_drag": self.dry}
+    def changes(self, label: str) -> Sequence[Change]:
+        """Return its inputs while it lasts."""
+        inputs = {"viscous_drag": self.viscous, "dry_drag": self.dry}
+        return Change(self.start, inputs), Change(self.end, dict.fromkeys(inputs, 0.0))
 
 
-Touching = Drag
+Touching = Annotated[Drag | Plane | Sphere | Cylinder | Box, Field(discriminator="kind")]
 """What an entry of `environment` may be."""
+
+
+def labelled(environment: Sequence[AbstractTouching]) -> dict[str, AbstractTouching]:
+    """Return the entries that act by what a run calls them: by their names, or their kinds and how many there were.
+
+    Raises
+    ------
+    Mistakes
+        For two of one name.
+    """
+    named: dict[str, AbstractTouching] = {}
+    for i, entry in enumerate(environment):
+        if not entry.acts:
+            continue
+        label, number = entry.name or entry.usual, 2
+        if entry.name and label in named:
+            raise Mistakes(((i, "name"), f"another entry has the name {label}"))
+        while label in named:
+            label, number = f"{entry.usual}_{number}", number + 1
+        named[label] = entry
+    return named
 
 
 def as_drags(written: Any) -> Any:

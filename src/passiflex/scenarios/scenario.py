@@ -18,7 +18,7 @@ from passiflex.scenarios.control_settings import (
     change_mistakes,
     gain_mistakes,
 )
-from passiflex.scenarios.environment import Touching, as_drags
+from passiflex.scenarios.environment import Touching, as_drags, labelled
 from passiflex.scenarios.law_settings import LawSettings
 from passiflex.scenarios.model_errors import Deviations, ModelErrors
 from passiflex.scenarios.noise_settings import Noise
@@ -27,6 +27,7 @@ from passiflex.scenarios.reference import ZERO, ReferenceEvent
 from passiflex.scenarios.row_interval import fitting_interval, interval_mistake
 from passiflex.scenarios.spans import Seconds, TimeSpan
 from passiflex.scenarios.tank_settings import TankSettings
+from passiflex.scenarios.touching import Hand
 from passiflex.texts.quantity import Quantity
 from passiflex.texts.section import Mistakes, Section
 
@@ -110,6 +111,7 @@ class Scenario(Section):
         validation_alias=AliasChoices("environment", "drags"),
         description="what touches the end effector",
     )
+    hand: Hand = Field(default=Hand(), description="where the end effector may touch surfaces")
     output_interval: Seconds = Field(
         default_factory=fitting_interval,
         validate_default=True,
@@ -132,6 +134,12 @@ class Scenario(Section):
     def from_former(cls, name: str, written: Any) -> Any:
         """Return what was written for an entry by its former name as the entry takes it by its new one."""
         return as_drags(written) if name == "drags" else written
+
+    @field_validator("environment")
+    @classmethod
+    def _of_different_names(cls, environment: tuple[Touching, ...]) -> tuple[Touching, ...]:
+        labelled(environment)
+        return environment
 
     @field_validator("tank")
     @classmethod
@@ -233,7 +241,7 @@ class Scenario(Section):
     @classmethod
     def _within_the_run(cls, entries: tuple[Any, ...], info: ValidationInfo) -> tuple[Any, ...]:
         end = info.data.get("duration", float("inf"))
-        begin = [("at", e.at) if isinstance(e, GainChange) else ("from", e.start) for e in entries]
+        begin = [("at", e.at) if isinstance(e, GainChange) else ("from", e.lasts[0]) for e in entries]
         needs = f"needs to be earlier than the end, {end:g} s"
         late = [((i, name), f"{needs}; got {t:g} s") for i, (name, t) in enumerate(begin) if not t < end]
         if late:

@@ -19,6 +19,11 @@ class TimeSpan(Section):
     start: Instant = Field(alias="from", description="when it begins, s")
     end: Instant = Field(alias="to", description="when it ends, s")
 
+    @property
+    def lasts(self) -> tuple[float, float]:
+        """Return from when to when it lasts [s]."""
+        return self.start, self.end
+
     @model_validator(mode="after")
     def _ordered(self) -> Self:
         if not self.end > self.start:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
+from passiflex.elements import Mobility
 from passiflex.engines.engine import NATIVE, AbstractEngine
 from passiflex.errors import SimulationError
 from passiflex.loops.compiled import CompiledSampledLoop, compiled_sampled_loop
@@ -23,6 +26,8 @@ Array = NDArray[np.float64]
 
 RESOLVED = 0.35
 """Share of Runge-Kutta's stability limit that a step uses: energies of Fig. 1 then close to 1e-8 J."""
+TOUCHING = 0.15
+"""Step times the rate at which robot and element swing on each other: some twenty steps for an impact."""
 CHUNK = 8192
 """Periods that are made ready at a time; it bounds the memory, whatever the length of a run."""
 MOST_STEPS = 200_000_000
@@ -66,7 +71,8 @@ def longest_step(problem: SampledProblem, plant: NativeFunction) -> float:
     for event in problem.events:
         worst |= {name: np.maximum(worst[name], value) for name, value in event.inputs.items()}
     pole = fastest_pole(plant, x, np.concatenate([problem.held, layout.pack(worst)]), problem.plant)
-    longest = RESOLVED * STABILITY_LIMIT / pole
+    touching = max((e.rate(mobility(problem)) for e in problem.elements), default=0.0)
+    longest = min(RESOLVED * STABILITY_LIMIT / pole, TOUCHING / touching if touching else math.inf)
     if problem.duration / longest > MOST_STEPS:
         raise SimulationError(
             "the plant is too fast to be simulated",
@@ -74,6 +80,13 @@ def longest_step(problem: SampledProblem, plant: NativeFunction) -> float:
             needs=f"at most {MOST_STEPS:.0e} steps",
         )
     return longest
+
+
+def mobility(problem: SampledProblem) -> Mobility:
+    """Return how easily the robot is moved where it may be touched, at its start."""
+    at, plant = standing(problem), problem.parts.unpack("plant", problem.numbers)
+    J, free = at.arm.jacobian[:3], np.linalg.inv(at.arm.mass_matrix)
+    return Mobility(float(np.linalg.norm(J @ free @ J.T, 2)), np.diag(free), 1 / plant["motor_inertia"])
 
 
 def sample_count(problem: SampledProblem) -> int:

@@ -1,0 +1,349 @@
+"""Surfaces: energy to the last bit, closed forms of an impact, of sticking and of sliding, and runs that press."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from types import SimpleNamespace
+from typing import Any
+
+import casadi as cs
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+from scipy.spatial.transform import Rotation
+
+import passiflex as pf
+from honest import balance, require_honest
+from passiflex.control.motion import Pose
+from passiflex.control.posture import posture
+from passiflex.elements import (
+    AbstractNormal,
+    AbstractShape,
+    Box,
+    Cylinder,
+    HuntCrossley,
+    Linear,
+    Mobility,
+    Plane,
+    Sphere,
+    Surface,
+    Touch,
+)
+from passiflex.errors import PassiflexError
+from passiflex.layout import View
+from passiflex.passivity import audit, environment_balance
+from passiflex.robots.flexible import FlexibleJointRobot
+from passiflex.simulation import Run, parse_scenario
+from passiflex.simulation.simulate_sampled import TOUCHING
+from worlds import world
+
+SHAPES = (Plane(), Sphere(), Cylinder(), Box())
+MASS = 3.0
+Slopes = Callable[[np.ndarray], np.ndarray]
+
+
+@pytest.mark.parametrize("moved", [False, True])
+@pytest.mark.parametrize("rubs", [False, True])
+@pytest.mark.parametrize("normal", [Linear(), HuntCrossley()], ids=["linear", "hunt_crossley"])
+@pytest.mark.parametrize("shape", SHAPES, ids=lambda s: type(s).__name__)
+def test_a_surface_gives_nothing_of_its_own(
+    shape: AbstractShape, normal: AbstractNormal, *, rubs: bool, moved: bool
+) -> None:
+    """Also at edges, within and without, with points anywhere on the hand, and with what moves it in the books."""
+    surface = Surface(shape=shape, normal=normal, points=2, rubs=rubs, moved=moved)
+    require_honest(surface)
+    assert any(balance(surface, seed)[1] > 0 for seed in range(50))
+
+
+@pytest.mark.parametrize("shape", SHAPES, ids=lambda s: type(s).__name__)
+def test_the_way_out_is_where_the_distance_grows(shape: AbstractShape) -> None:
+    """|∇distance| = 1, along the direction that is said: in, out, beside faces, edges and corners."""
+    p = cs.SX.sym("p", 3)
+    nearest = shape.nearest(p, {name: cs.SX(0.7) for name in shape.sizes})
+    f = cs.Function("f", [p], [cs.gradient(nearest.distance, p), nearest.outward])
+    rng = np.random.default_rng(3)
+    for _ in range(300):
+        slope, outward = (np.array(v).ravel() for v in f(rng.normal(size=3)))
+        np.testing.assert_allclose(outward, slope, atol=1e-9)
+        assert np.linalg.norm(outward) == pytest.approx(1, abs=1e-9)
+
+
+def ball(surface: Surface) -> Slopes:
+    """Return ẋ for a point mass at the tip of nothing: position, velocity, then what the surface remembers."""
+    n, own_layout = 1, surface.state(1)
+    x = cs.SX.sym("x", 6 + own_layout.size)
+    numbers = surface.parameters(n).pack(dict(surface.numbers(n)))
+    m = surface.parameters(n).view(cs.SX(numbers))
+    eye, joint = cs.SX.eye(3), SimpleNamespace(q=cs.SX(1, 1), dq=cs.SX(1, 1))
+    own = own_layout.view(x[6:])
+    at = Touch(joint, x[3:6], cs.SX.zeros(3), x[:3], eye, eye, own)
+    effect = surface.act(at, View(), m)
+    f = cs.Function("f", [x], [cs.densify(cs.vertcat(x[3:6], effect.force / MASS, effect.rate))])
+    return lambda now: np.array(f(now)).ravel()
+
+
+def followed(f: Slopes, x: np.ndarray, step: float, time: float) -> np.ndarray:
+    """Return the states of Runge-Kutta 4 at every step, as the native loop takes them."""
+    states = [x]
+    for _ in range(round(time / step)):
+        k1 = f(x)
+        k2 = f(x + step / 2 * k1)
+        k3 = f(x + step / 2 * k2)
+        k4 = f(x + step * k3)
+        x = x + step / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+        states.append(x)
+    return np.array(states)
+
+
+def wall(normal: AbstractNormal, **values: Any) -> Surface:
+    return Surface(normal=normal, rubs="friction" in values, values={"points": np.zeros((1, 3)), **values})
+
+
+def speed_after(normal: AbstractNormal, step: float, stiffness: float, damping: float, speed: float) -> float:
+    """Return how fast the mass leaves."""
+    start = np.array([0, 0, 0.3 * speed * step, 0, 0, -speed])  # a touch that falls between two steps
+    f = ball(wall(normal, stiffness=stiffness, damping=damping))
+    states = followed(f, start, step, 4 * math.pi / math.sqrt(stiffness / MASS))
+    assert states[-1, 2] > 0
+    return float(states[-1, 5])
+
+
+def hunt_crossley(damping: float, speed: float) -> float:
+    """Return how fast it leaves: c (v + u) = ln((1 + c v)/(1 − c u)), whatever mass and stiffness."""
+    if damping == 0:
+        return speed
+
+    def left(u: float) -> float:
+        return damping * (speed + u) - math.log((1 + damping * speed) / (1 - damping * u))
+
+    return brentq(left, 1e-9 * speed, min(speed, (1 - 1e-12) / damping))
+
+
+def linear(stiffness: float, damping: float, speed: float) -> float:
+    """Return how fast it leaves the surface when that no more presses: the damped oscillator at k δ + d δ̇ = 0."""
+    w = math.sqrt(stiffness / MASS)
+    zeta = damping / (2 * MASS * w)
+    wd = w * math.sqrt(1 - zeta**2)
+    t = math.atan2(2 * zeta * math.sqrt(1 - zeta**2), 2 * zeta**2 - 1) / wd  # where the acceleration is 0
+    t = t if t > 0 else t + math.pi / wd
+    return float(-speed * math.exp(-zeta * w * t) * (math.cos(wd * t) - zeta * w / wd * math.sin(wd * t)))
+
+
+@pytest.mark.parametrize("speed", [0.01, 0.3, 2.0])
+@pytest.mark.parametrize("stiffness", [1e2, 1e4, 1e6])
+@pytest.mark.parametrize("c", [0.0, 0.3, 3.0])
+def test_a_mass_bounces_off_as_the_closed_form_says(c: float, stiffness: float, speed: float) -> None:
+    """Its energy to 1 %, at the step that a run takes; half the step is nearer."""
+    w = math.sqrt(stiffness / MASS)
+    free = Mobility(1 / MASS, np.zeros(1), np.zeros(1))
+    for normal, damping, right in (
+        (HuntCrossley(), c, hunt_crossley(c, speed)),
+        (
+            Linear(),
+            2 * min(0.2 * c, 0.7) * w * MASS,
+            linear(stiffness, 2 * min(0.2 * c, 0.7) * w * MASS, speed),
+        ),
+    ):
+        surface = wall(normal, stiffness=stiffness, damping=damping)
+        errors = []
+        for finer in (1, 4):
+            step = TOUCHING / surface.rate(free) / finer
+            energy = speed_after(normal, step, stiffness, damping, speed) ** 2 / right**2
+            errors.append(abs(energy - 1))
+        assert errors[0] < 0.01
+        assert errors[1] < max(errors[0] / 3, 1e-6)
+
+
+def test_a_bristle_holds_for_good_and_then_gives_exactly_its_limit() -> None:
+    """Pushed with 40 % of μ f it does not creep; with more than μ f it slides, and the force is μ f."""
+    weight, mu = 20.0, 0.5
+    surface = wall(
+        HuntCrossley(), stiffness=1e4, damping=1.0, friction=mu, bristle_stiffness=1e4, viscous=0.0
+    )
+    f = ball(surface)
+
+    def pushed(by: float) -> np.ndarray:
+        push = np.zeros(9)
+        push[3], push[5] = by / MASS, -weight / MASS
+        damper = np.zeros(9)
+
+        def slopes(x: np.ndarray) -> np.ndarray:
+            damper[3:6] = -x[3:6] * 400 / MASS if by < mu * weight else 0  # it comes to rest
+            return f(x) + push + damper
+
+        start = np.array([0, 0, -weight / 1e4, 0, 0, 0, 0, 0, 0], dtype=float)
+        return followed(slopes, start, 1e-4, 1.0)
+
+    held = pushed(0.4 * mu * weight)
+    assert abs(held[-1, 0] - 0.4 * mu * weight / 1e4) < 1e-9
+    assert abs(held[-1, 0] - held[5000, 0]) < 1e-10
+    slid = pushed(1.6 * mu * weight)
+    acceleration = np.gradient(slid[:, 3], 1e-4)[2000:]
+    np.testing.assert_allclose(acceleration, 0.6 * mu * weight / MASS, rtol=2e-3)
+
+
+PLANE = {"kind": "plane", "point": [0, 0, 0], "normal": [0, 0, 1], "stiffness": 1e4}
+"""Under the planar arm, which moves in x and z."""
+
+
+def beside(**more: Any) -> dict[str, Any]:
+    """Return a wall 20 mm above the hand's start, facing down."""
+    return PLANE | {"point": [0, 0, 0.02], "normal": [0, 0, -2], "relative": True} | more
+
+
+def pressed(*surfaces: dict[str, Any], **changes: Any) -> Run:
+    run = pf.simulate(
+        world(**{"environment": list(surfaces), "duration": 1.0, "output_interval": 0.002} | changes)
+    )
+    assert not run.failure
+    return run
+
+
+@pytest.mark.parametrize("stiffness", [1e3, 1e4, 1e5, 1e6])
+def test_an_arm_presses_with_its_own_spring(stiffness: float) -> None:
+    """Springs in a row share the 30 mm by which the goal is in the wall: of law, joints and wall."""
+    scenario = world(environment=[beside(stiffness=stiffness, dissipation=1.0)], duration=4.0)
+    run, robot = pf.simulate(scenario), FlexibleJointRobot.load(scenario.robot)
+    J = posture(robot, run["q"][-1], robot.nominal()).jacobian[2]
+    softness = 1 / 200 + 1 / stiffness + J @ (J / robot.joint_stiffness)
+    depth, force = run["plane_depth"][-1], run["plane_force"][-1]
+    assert force[2] == pytest.approx(-0.03 / softness, rel=1e-3)
+    assert depth == pytest.approx(-force[2] / stiffness, rel=1e-6)
+    assert audit(run).verdict == "passive"
+    assert environment_balance(run).worst < 1e-4
+    assert audit(run).ledger_residual < 1e-4
+
+
+def test_the_books_close_better_with_shorter_steps(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The kink where the hand arrives is of a fixed order, no more."""
+    left = []
+    for share in (0.3, 0.03):
+        monkeypatch.setattr("passiflex.simulation.simulate_sampled.TOUCHING", share)
+        run = pressed(beside(stiffness=1e6, dissipation=1.0))
+        left.append(environment_balance(run).worst)
+    assert left[1] < left[0] / 3
+
+
+def test_what_moves_a_wall_gives_the_energy() -> None:
+    """A wall that comes to a hand at rest pushes it; all that it gave, stored and lost came from what moves it."""
+    coming = beside(
+        point=[0, 0, -0.02],
+        normal=[0, 0, 1],
+        motion=[{"kind": "move", "at": 0.1, "by": [0, 0, 0.06], "duration": 0.3}],
+    )
+    run = pressed(coming, reference=[], tank={"initial": 2})
+    assert run["plane_place"][-1, 2] - run["plane_place"][0, 2] == pytest.approx(0.06)
+    assert run["position"][-1, 2] - run["position"][0, 2] > 0.03
+    assert run["plane_supplied_energy"][-1] > 0.1
+    assert environment_balance(run).worst < 1e-4 * run["plane_supplied_energy"].max()
+    assert audit(run).verdict == "passive"
+
+
+def test_surfaces_have_names_and_books_of_their_own() -> None:
+    run = pressed(beside(), beside(point=[0, 0, -0.5], normal=[0, 0, 1]), beside(name="lid", stiffness=2e4))
+    assert [e.name for e in run.elements] == ["friction", "plane", "plane_2", "lid"]
+    assert not run["plane_2_force"].any()
+    np.testing.assert_allclose(run["lid_force"][-1], 2 * run["plane_force"][-1], rtol=1e-3)
+
+
+def test_a_wall_that_is_turned_with_the_arm_is_the_same_wall() -> None:
+    """Each shape, where its nearest point is that of the plane, presses as the plane does: a large one bends little."""
+    flat = pressed(beside())["position"]
+    ways = (
+        {"kind": "box", "centre": [0, 0, 0.12], "size": [1, 1, 0.2]},
+        {"kind": "sphere", "centre": [0, 0, 1000.02], "radius": 1000},
+        {"kind": "cylinder", "centre": [0, 0, 1000.02], "axis": [0, 1, 0], "radius": 1000},
+        {"kind": "cylinder", "centre": [0, 0, 0.12], "axis": [0, 0, 3], "radius": 1, "length": 0.2},
+    )
+    for way in ways:
+        body = {k: v for k, v in beside().items() if k not in ("point", "normal")} | way
+        np.testing.assert_allclose(pressed(body)["position"], flat, atol=1e-6)
+
+
+def test_a_hand_of_several_points_is_pressed_at_those_that_touch() -> None:
+    one = pressed(beside(), hand={"radius": 0.01})
+    two = pressed(beside(), hand={"radius": 0.01, "points": [[0, 0, 0], [0, 0.3, 0]]})
+    assert abs(one["plane_force"][-1, 2]) > 1
+    np.testing.assert_allclose(two["plane_force"][-1, 2], one["plane_force"][-1, 2], rtol=0.02)
+
+
+MISTAKES = {
+    "within": (
+        beside(point=[0, 0, -0.01]),
+        r"the hand starts within plane; got 10 mm deep, with the end effector at .*; needs a start outside; .*; "
+        r"try a place 10 mm or more against \[0, 0, -1\], which is out of it",
+    ),
+    "swallowed": (
+        {"kind": "sphere", "name": "planet", "centre": [0, 0, 0], "radius": 50, "stiffness": 100},
+        "the hand starts within planet",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", MISTAKES)
+def test_a_start_within_a_surface_is_refused(case: str) -> None:
+    surface, said = MISTAKES[case]
+    with pytest.raises(PassiflexError, match=said):
+        pressed(surface)
+
+
+REFUSED = {
+    "soft": ({"stiffness": 0}, "stiffness"),
+    "flat": ({"normal": [0, 0, 0]}, "normal: is no direction"),
+    "damper": ({"damping": 3}, r"damping: is of law: linear; this one is hunt_crossley"),
+    "dissipation": (
+        {"law": "linear", "dissipation": 3},
+        "dissipation: is of law: hunt_crossley; this one is linear",
+    ),
+    "turning": (
+        {"motion": [{"kind": "step", "at": 0.1, "by": [0, 0, 0], "turn": [0, 0, 1]}]},
+        "turn: a surface moves, and does not turn",
+    ),
+    "disorder": (
+        {"motion": [{"kind": "hold", "at": 0.2}, {"kind": "hold", "at": 0.1}]},
+        r"motion\[1\]\.at: later than the one before; got 0.1 s",
+    ),
+    "name": ({"name": "A wall"}, "name"),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_a_surface_that_is_none_is_refused(case: str) -> None:
+    changes, said = REFUSED[case]
+    with pytest.raises(PassiflexError, match=said):
+        world(environment=[beside(**changes)])
+
+
+def test_two_of_one_name_are_refused() -> None:
+    with pytest.raises(PassiflexError, match="another entry has the name lid"):
+        world(environment=[beside(name="lid"), beside(name="lid")])
+
+
+def test_a_scenario_with_surfaces_is_written_whole() -> None:
+    scenario = world(
+        environment=[beside(friction=0.2, motion=[{"kind": "hold", "at": 0.2}])], hand={"radius": 0.01}
+    )
+    assert parse_scenario(scenario.to_yaml()) == scenario
+
+
+def test_continuous_time_touches_too() -> None:
+    """And the sampled run comes nearer to it, the faster its clock."""
+    surface = beside(dissipation=1.0)
+    slow = pressed(surface, control=None, tank=None, noise=None)
+    assert abs(slow["plane_force"][-1, 2]) > 1
+    assert environment_balance(slow).worst < 1e-6
+    far = [
+        np.abs(pressed(surface, tank=None, control={"rate": rate})["q"] - slow["q"]).max()
+        for rate in (4000, 16000)
+    ]
+    assert far[1] < far[0] / 3
+
+
+def test_the_start_is_looked_at_where_the_hand_is() -> None:
+    """With the hand turned, and a point away from the end effector."""
+    point = Pose(np.array([1.0, 2.0, 3.0]), Rotation.from_rotvec([0, math.pi / 2, 0]).as_matrix())
+    surface = Surface(values={"points": np.array([[0.5, 0, 0]]), "place": [0, 0, 2.6], "roundness": 0.0})
+    with pytest.raises(PassiflexError, match="100 mm deep"):
+        surface.require_apart(point)
+    surface.require_apart(point._replace(position=np.array([1.0, 2.0, 3.2])))
