@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import sys
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import yaml
 
+from cli.shell import Shell
 from passiflex.errors import NameUnknownError, ValueRangeError
 from passiflex.extras import MissingExtraError
 from passiflex.loops.compiled import compiled_sampled_loop
 from passiflex.passivity import audit, link_balance
 from passiflex.problems.problem import SampledProblem
+from passiflex.reports.facts import facts
 from passiflex.simulation import Run, parse_scenario, resolve, simulate, simulate_problem, simulate_sampled
 from passiflex.studies import shipped_scenario
-from worlds import PERIOD, planar_text, world
+from worlds import PERIOD, PLAIN, planar_text, world
 
 ANGLE = 1e-6
 """What is promised [rad]; at equal steps the two integrators are one method, and what is left is round-off."""
@@ -37,6 +40,11 @@ LATE: dict[str, Any] = {
     "forces": [{"from": 0.3, "to": 0.5, "force": [3, 0, 2], "moment": [0, 1, 0]}],
 }
 """Commands that come late, in disorder or never; friction, drag, weight, a push, noise."""
+
+
+@pytest.fixture
+def shell(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Shell:
+    return Shell(monkeypatch, capsys)
 
 
 def both(problem: SampledProblem) -> tuple[Run, Run]:
@@ -165,3 +173,21 @@ def test_without_mujoco_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch)
         MissingExtraError, match=r"the engine mujoco needs the package 'mujoco'.*passiflex\[mujoco\]"
     ):
         simulate(world(), engine="mujoco")
+
+
+def test_the_command_line_has_the_engine(shell: Shell, tmp_path: Path) -> None:
+    """A run that another engine moved is said to be so by `simulate`, by `audit`, and on its page."""
+    scenario, out = tmp_path / "s.yaml", tmp_path / "run.nc"
+    scenario.write_text(PLAIN)
+    made = shell("simulate", scenario, "--engine", "mujoco", "--out", out)
+    assert (made.status, made.err) == (0, "")
+    assert "moved by mujoco 4." in made.out
+    assert "moved by mujoco 4." in shell("audit", out).out
+    run = Run.load(out)
+    assert run.moved_elsewhere
+    assert ("moved by", run.engine) in facts(run, run.scenario)
+    native = simulate(world())
+    assert "moved by" not in dict(facts(native, native.scenario))
+    wrong = shell("simulate", scenario, "--engine", "mojoco", "--out", out)
+    assert (wrong.status, wrong.out.count("moved by")) == (2, 0)
+    assert "unknown engine; got 'mojoco'; needs one of mujoco, passiflex; try 'mujoco'" in wrong.err
