@@ -12,7 +12,8 @@ from passiflex.control.law import AbstractLaw
 from passiflex.control.motion import Pose
 from passiflex.control.posture import Posture
 from passiflex.control.tank import NO_CAP
-from passiflex.elements import MotorFriction
+from passiflex.elements import AbstractElement, MotorFriction, SpeedBrake, StickingFriction
+from passiflex.elements.end_stops import NO_END
 from passiflex.errors import SizeError
 from passiflex.loops.plant import Elements
 from passiflex.loops.sampled_loop import SampledLoop
@@ -24,14 +25,18 @@ from passiflex.sampled.motors import UNLIMITED_TORQUE
 from passiflex.sampled.sensors import UNFILTERED
 from passiflex.scenarios.control_settings import Actions, Control, MotorSettings, SensorSettings
 from passiflex.scenarios.environment import labelled
+from passiflex.scenarios.held_settings import Load
 from passiflex.scenarios.noise_settings import Noise
 from passiflex.scenarios.scenario import Scenario
 from passiflex.scenarios.tank_settings import TankSettings
+from passiflex.scenarios.touching import Site
 
 Array = NDArray[np.float64]
 
 POSTURE_RATIO = 0.7
 """Damping ratio of the spring to a posture, joint by joint, unless its damping is given."""
+BRAKING = 0.01
+"""Time [s] within which a motor comes back to its speed limit."""
 VELOCITY_GAIN, ACCELERATION_GAIN = 0.3, 0.05
 """Of the matched inner loop's estimates: of those that were tried at 1 kHz, the best compromise between the
 torque's noise and the lag in q̇, which acts as further inertia; from 0.2 on the second gain destabilises."""
@@ -70,7 +75,7 @@ def sampled_parts(
         tank.build() if tank and law.has_tank else None,
         control.build_external(),
         control.build_inner(),
-        actions=scenario.actions is not None or bool(scenario.feedforward),
+        actions=scenario.actions is not None or bool(_feedforward(scenario, robot)),
     )
     motors, sensors = scenario.motors or MotorSettings(), scenario.sensors or SensorSettings()
     moved = np.diag(known.start.mass_matrix) + gains.get("shaped_inertia", model["motor_inertia"])
@@ -104,10 +109,16 @@ def sampled_parts(
         "allow_unstable": control.allow_unstable,
         "held": known.start.gravity_torque,
         "gain_changes": _gain_changes(scenario, gains),
-        "feedforward": tuple(
-            Lasting(f.start, f.end, np.array([*f.force, *f.moment])) for f in scenario.feedforward
-        ),
+        "feedforward": _feedforward(scenario, robot),
     }
+
+
+def _feedforward(scenario: Scenario, robot: FlexibleJointRobot) -> tuple[Lasting, ...]:
+    """Return what the end effector is to exert: what was asked for, and what holds up the loads that the law knows."""
+    asked = [Lasting(f.start, f.end, np.array([*f.force, *f.moment])) for f in scenario.feedforward]
+    down = np.array(robot.arm.chain.gravity)
+    known = [e for e in scenario.environment if isinstance(e, Load) and e.known]
+    return (*asked, *(Lasting(e.start, e.end, np.array([*-e.mass * down, 0, 0, 0])) for e in known))
 
 
 def elements_of(scenario: Scenario, robot: FlexibleJointRobot, at: Pose) -> Elements:
@@ -128,12 +139,30 @@ def elements_of(scenario: Scenario, robot: FlexibleJointRobot, at: Pose) -> Elem
         for name in ("coulomb_friction", "viscous_friction")
     )
     rubs = bool(np.any(coulomb) or np.any(viscous))
-    friction = MotorFriction(rubs, coulomb, viscous, motors.friction_width)
+    friction: AbstractElement = MotorFriction(rubs, coulomb, viscous, motors.friction_width)
+    if motors.friction == "sticks" and np.any(coulomb):
+        friction = StickingFriction(
+            True, coulomb, viscous, motors.static_friction, motors.stribeck_speed, motors.break_away
+        )
+    brakes = _brakes(motors, robot)
     entries = labelled(scenario.environment).items()
-    others = {e.structure: e for e in (entry.build(name, at, scenario.hand) for name, entry in entries)}
+    site = Site(robot, at, scenario.hand)
+    others = {e.structure: e for e in (entry.build(name, site) for name, entry in entries)}
     for element in others.values():
         element.require_apart(at)
-    return (*[friction] * (rubs or scenario.control is not None), *others.values())
+    return (*[friction] * (rubs or scenario.control is not None), *brakes, *others.values())
+
+
+def _brakes(motors: MotorSettings, robot: FlexibleJointRobot) -> Elements:
+    """Return what brakes motors beyond their speed limits, if they have any."""
+    if motors.speed_limit == "none":
+        return ()
+    limit = (
+        robot.velocity_limit
+        if motors.speed_limit == "robot"
+        else _joints(robot, "motors.speed_limit", motors.speed_limit)
+    )
+    return (SpeedBrake(limit=np.minimum(limit, NO_END), brake=robot.motor_inertia / BRAKING),)
 
 
 def _joints(robot: FlexibleJointRobot, name: str, value: ArrayLike) -> Array:
@@ -242,8 +271,13 @@ def _errors(
 
 def _limits(motors: MotorSettings, robot: FlexibleJointRobot) -> dict[str, Array]:
     unlimited = np.full(robot.n, UNLIMITED_TORQUE)
-    limit = robot.torque_limit if motors.torque_limit == "robot" else unlimited
-    rate = np.full(robot.n, min(motors.torque_rate_limit, UNLIMITED_TORQUE))
+    named = {"none": unlimited, "robot": robot.torque_limit}
+    limit = (
+        named[motors.torque_limit]
+        if isinstance(motors.torque_limit, str)
+        else _joints(robot, "motors.torque_limit", motors.torque_limit)
+    )
+    rate = np.minimum(_joints(robot, "motors.torque_rate_limit", motors.torque_rate_limit), UNLIMITED_TORQUE)
     return {"torque_limit": np.minimum(limit, UNLIMITED_TORQUE), "torque_rate_limit": rate}
 
 

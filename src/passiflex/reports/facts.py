@@ -133,7 +133,7 @@ def _world(scenario: Scenario) -> Iterator[tuple[str, str]]:
         )
     motors = scenario.motors
     if motors is not None:
-        limit = "torques limited" if motors.torque_limit == "robot" else "torques not limited"
+        limit = "torques not limited" if motors.torque_limit == "none" else "torques limited"
         rubbing = np.any(motors.coulomb_friction) or np.any(motors.viscous_friction)
         yield "motors", f"{limit}, {'with' if rubbing else 'no'} friction"
     noise = scenario.noise

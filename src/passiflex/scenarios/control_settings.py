@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
+import numpy as np
 from pydantic import AliasChoices, BeforeValidator, Field, model_validator
 
 from passiflex.scenarios.gain_settings import (
@@ -29,6 +30,9 @@ Frequency = Annotated[float, Quantity("Hz", above=0, finite=False)]
 Angle = Annotated[float, Quantity("rad", least=0)]
 Share = Annotated[float, Quantity("1", least=0, most=1)]
 PerJoint = ((), (None,))
+NAMED = ("none", "robot")
+TorqueLimit = Annotated[str | float | Vector, Quantity("N m", PerJoint, above=0, names=NAMED)]
+SpeedLimit = Annotated[str | float | Vector, Quantity("rad/s", PerJoint, above=0, names=NAMED)]
 ENDLESS = float("inf")
 NOW = 1e-9
 """Two instants closer than this are one [s]."""
@@ -162,11 +166,22 @@ class SensorSettings(Section):
 class MotorSettings(Section):
     """What the motors make of a command; without it they give it exactly."""
 
-    torque_limit: Literal["none", "robot"] = Field(
-        default="none", description="largest torque: none, or that of the robot's description"
+    torque_limit: TorqueLimit = Field(
+        default="none",
+        description="largest torque: none, that of the robot's description, or in N m, one number or one each",
     )
-    torque_rate_limit: Annotated[float, Quantity("N m/s", above=0, finite=False)] = Field(
-        default=ENDLESS, description="fastest change of the torque, N m/s; inf for none"
+    torque_rate_limit: Annotated[float | Vector, Quantity("N m/s", PerJoint, above=0, finite=False)] = Field(
+        default=ENDLESS,
+        description="fastest change of the torque, one number or one each, N m/s; inf for none",
+    )
+    speed_limit: SpeedLimit = Field(
+        default="none",
+        description="beyond which a motor is braked: none, that of the robot's description, or in rad/s, one number "
+        "or one each",
+    )
+    friction: Literal["sticks", "smooth"] = Field(
+        default="smooth",
+        description="how coulomb_friction acts: it sticks, or it is smooth and creeps where it should stick",
     )
     coulomb_friction: Annotated[float | Vector, Quantity("N m", PerJoint, least=0)] = Field(
         default=0.0, description="at the motors, one number for all joints or one each, N m"
@@ -178,11 +193,21 @@ class MotorSettings(Section):
         default=0.01, description="speed over which Coulomb friction changes its sign, rad/s"
     )
 
+    static_friction: Annotated[float, Quantity("1", least=1, most=10)] = Field(
+        default=1.0, description="of friction that sticks, before it slips, as a multiple of coulomb_friction"
+    )
+    stribeck_speed: Annotated[float, Quantity("rad/s", above=0)] = Field(
+        default=0.01, description="over which it falls from there to coulomb_friction, rad/s"
+    )
+    break_away: Annotated[float, Quantity("rad", above=0)] = Field(
+        default=1e-4, description="by which a motor gives way before it slips, seen from the link, rad"
+    )
+
     def require_unlimited(self) -> None:
         """Raise Mistakes for limits, which only a sampled run has."""
         said = {
             "torque_limit": self.torque_limit != "none",
-            "torque_rate_limit": self.torque_rate_limit < ENDLESS,
+            "torque_rate_limit": min(np.atleast_1d(self.torque_rate_limit)) < ENDLESS,
         }
         if found := [
             ((name,), "needs `control`: only a sampled run has it") for name, is_set in said.items() if is_set

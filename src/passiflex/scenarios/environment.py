@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
+import numpy as np
 from pydantic import Field
 
+from passiflex.errors import SizeError
+from passiflex.scenarios.held_settings import Load, Person
 from passiflex.scenarios.spans import TimeSpan
 from passiflex.scenarios.surface_settings import Box, Cylinder, Plane, Sphere
-from passiflex.scenarios.touching import KINDS, AbstractTouching, Change, Hand
+from passiflex.scenarios.touching import KINDS, AbstractTouching, Change, Site
 from passiflex.texts.quantity import Quantity
 from passiflex.texts.section import Mistakes
 
 if TYPE_CHECKING:  # who reads a scenario needs no CasADi
-    from passiflex.control.motion import Pose
     from passiflex.elements import AbstractElement
 
 
@@ -25,7 +27,7 @@ class Drag(TimeSpan, AbstractTouching):
     viscous: Annotated[float, Quantity("N s/m", least=0)] = Field(default=0.0, description="N s/m")
     dry: Annotated[float, Quantity("N", least=0)] = Field(default=0.0, description="against the motion, N")
 
-    def build(self, label: str, at: Pose, hand: Hand) -> AbstractElement:
+    def build(self, label: str, site: Site) -> AbstractElement:
         """Return the element; all drags are one."""
         from passiflex.elements import Drag
 
@@ -42,7 +44,53 @@ class Drag(TimeSpan, AbstractTouching):
         return Change(self.start, inputs), Change(self.end, dict.fromkeys(inputs, 0.0))
 
 
-Touching = Annotated[Drag | Plane | Sphere | Cylinder | Box, Field(discriminator="kind")]
+class EndStops(AbstractTouching):
+    """The joints have ends, and a link that comes to one is pressed back."""
+
+    single: ClassVar[bool] = True
+    kind: Literal["end_stops"] = Field(description=KINDS)
+    stiffness: Annotated[float | tuple[float, ...], Quantity("N m/rad", ((), (None,)), above=0)] = Field(
+        default=2e4, description="of the stops, one number or one each, N m/rad"
+    )
+    dissipation: Annotated[float, Quantity("s/rad", least=0)] = Field(
+        default=1.0, description="of the stops, s/rad, as of a surface"
+    )
+    lower: Annotated[tuple[float, ...], Quantity("rad", ((None,),))] | None = Field(
+        default=None, description="where they are, rad; the robot's position limits if left out"
+    )
+    upper: Annotated[tuple[float, ...], Quantity("rad", ((None,),))] | None = Field(
+        default=None, description="and at the other end, rad"
+    )
+
+    def build(self, label: str, site: Site) -> AbstractElement:
+        """Return the stops."""
+        from passiflex.elements import EndStops
+
+        robot, (lower, upper) = site.robot, site.robot.position_limit.T
+        for name in ("stiffness", "lower", "upper"):
+            value = getattr(self, name)
+            if value is not None and np.size(value) not in (1, robot.n):
+                raise SizeError(
+                    f"environment: {name} of end_stops does not fit robot {robot.name!r}",
+                    got=f"{np.size(value)} numbers",
+                    needs=f"{robot.n}, one for each joint",
+                )
+        return EndStops(
+            lower=lower if self.lower is None else self.lower,
+            upper=upper if self.upper is None else self.upper,
+            stiffness=self.stiffness,
+            dissipation=self.dissipation,
+        )
+
+    @property
+    def usual(self) -> str:
+        """Return what a run calls them."""
+        return "end_stops"
+
+
+Touching = Annotated[
+    Drag | Plane | Sphere | Cylinder | Box | Load | Person | EndStops, Field(discriminator="kind")
+]
 """What an entry of `environment` may be."""
 
 
@@ -59,6 +107,8 @@ def labelled(environment: Sequence[AbstractTouching]) -> dict[str, AbstractTouch
         if not entry.acts:
             continue
         label, number = entry.name or entry.usual, 2
+        if entry.single and any(type(e) is type(entry) for e in named.values()):
+            raise Mistakes(((i, "kind"), f"there is another entry of kind {entry.usual}; there can be one"))
         if entry.name and label in named:
             raise Mistakes(((i, "name"), f"another entry has the name {label}"))
         while label in named:

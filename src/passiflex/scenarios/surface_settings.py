@@ -12,12 +12,11 @@ from pydantic import Field, model_validator
 from scipy.spatial.transform import Rotation
 
 from passiflex.scenarios.reference import ZERO, Length, ReferenceEvent, Turn, Vector
-from passiflex.scenarios.touching import KINDS, AbstractTouching, Change, Hand
+from passiflex.scenarios.touching import KINDS, AbstractTouching, Change, Site
 from passiflex.texts.quantity import Quantity
 from passiflex.texts.section import Mistakes
 
 if TYPE_CHECKING:  # who reads a scenario needs no CasADi
-    from passiflex.control.motion import Pose
     from passiflex.elements import AbstractElement, AbstractShape
 
 Size = Annotated[float, Quantity("m", above=0)]
@@ -92,14 +91,14 @@ class AbstractSurface(AbstractTouching):
     def shape(self) -> AbstractShape:
         """Return its shape, in these axes."""
 
-    def build(self, label: str, at: Pose, hand: Hand) -> AbstractElement:
+    def build(self, label: str, site: Site) -> AbstractElement:
         """Return the surface."""
         from passiflex.elements import HuntCrossley, Linear, Surface
 
-        rubs = self.friction > 0
+        rubs, hand = self.friction > 0, site.hand
         bristles = min(self.stiffness, BRISTLE) if self.bristle_stiffness is None else self.bristle_stiffness
         values: dict[str, Any] = {
-            "place": np.array(self.place) + self.relative * at.position,
+            "place": np.array(self.place) + self.relative * site.at.position,
             "axes": self.axes,
             "stiffness": self.stiffness,
             "damping": self.damping if self.law == "linear" else self.dissipation,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import abc
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple
 
 from pydantic import Field
 
@@ -16,8 +16,9 @@ from passiflex.texts.section import Section
 if TYPE_CHECKING:  # who reads a scenario needs no CasADi
     from passiflex.control.motion import Pose
     from passiflex.elements import AbstractElement
+    from passiflex.robots.flexible import FlexibleJointRobot
 
-KINDS = "plane, sphere, cylinder, box, or drag"
+KINDS = "plane, sphere, cylinder, box, load, person, end_stops, or drag"
 
 
 class Change(NamedTuple):
@@ -38,9 +39,26 @@ class Hand(Section):
     )
 
 
+class Site(NamedTuple):
+    """Where an element is built.
+
+    Attributes
+    ----------
+    robot: The robot that it touches.
+    at: Where the end effector starts.
+    hand: Where that may touch surfaces.
+    """
+
+    robot: FlexibleJointRobot
+    at: Pose
+    hand: Hand
+
+
 class AbstractTouching(Section, abc.ABC):
     """An entry of `environment`; each has a `kind`."""
 
+    single: ClassVar[bool] = False
+    """Whether there can be one of its kind only."""
     name: str = Field(
         default="",
         pattern=r"^([a-z][a-z0-9_]*)?$",
@@ -64,8 +82,8 @@ class AbstractTouching(Section, abc.ABC):
         return 0.0, math.inf
 
     @abc.abstractmethod
-    def build(self, label: str, at: Pose, hand: Hand) -> AbstractElement:
-        """Return the element that a run calls by a label, for a robot whose end effector starts at a pose."""
+    def build(self, label: str, site: Site) -> AbstractElement:
+        """Return the element that a run calls by a label."""
 
     def changes(self, label: str) -> Sequence[Change]:
         """Return what changes of its inputs, in the order of time."""

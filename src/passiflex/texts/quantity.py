@@ -55,6 +55,7 @@ class Quantity:
     shapes: The shapes that are allowed; None stands for any length ≥ 1. The default is one number.
     above, least, most: Bounds of the numbers, the first one exclusive; entries of matrices are not bounded.
     finite: False allows inf.
+    names: Words that may stand in place of numbers.
     """
 
     unit: str
@@ -63,6 +64,7 @@ class Quantity:
     least: float | None = None
     most: float | None = None
     finite: bool = True
+    names: tuple[str, ...] = ()
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         """Return the schema of a field that is validated by `convert`."""
@@ -79,9 +81,9 @@ class Quantity:
             parts.append(f"≥ {self.least:g}")
         if self.most is not None:
             parts.append(f"≤ {self.most:g}")
-        return ", ".join(p for p in parts if p)
+        return " or ".join([*self.names, ", ".join(p for p in parts if p)])
 
-    def convert(self, written: Any) -> Numbers:
+    def convert(self, written: Any) -> Numbers | str:
         """Return what was written, in the field's unit.
 
         Raises
@@ -90,6 +92,8 @@ class Quantity:
             For text that is no quantity, a unit of another dimension, a wrong size, a number out of bounds,
             NaN, or inf where it is not allowed. The message says what was expected and what was got.
         """
+        if isinstance(written, str) and written in self.names:
+            return written
         try:
             value = self._numbers(written)
             shape = _shape(value)
