@@ -70,7 +70,14 @@ def require_same(one: Run, other: Run, angle: float = ANGLE, energy: float = ENE
     np.testing.assert_allclose(other["tau_m"], one["tau_m"], rtol=0, atol=1e-4)
 
 
-@pytest.mark.parametrize("changes", [{}, LATE], ids=["ideal", "late"])
+STATES: dict[str, Any] = {
+    "motors": {"coulomb_friction": 2, "friction": "sticks"},
+    "environment": [{"kind": "load", "from": 0.2, "to": 0.5, "mass": 1.0}],
+}
+"""Elements with states of their own, which go along with MuJoCo's stages."""
+
+
+@pytest.mark.parametrize("changes", [{}, LATE, STATES], ids=["ideal", "late", "states"])
 def test_a_run_is_the_same_in_mujoco(changes: dict[str, Any]) -> None:
     one, other = both(resolved(**changes))
     require_same(one, other, angle=1e-11)

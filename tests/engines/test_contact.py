@@ -7,9 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from engines.walls import Spring, Wall
+from engines.walls import Wall
 from passiflex.control.posture import posture
-from passiflex.errors import ValueRangeError
 from passiflex.loops.compiled import compiled_sampled_loop
 from passiflex.passivity import audit
 from passiflex.problems.own_parts import with_parts
@@ -124,10 +123,3 @@ def test_friction_is_dry_and_sticks() -> None:
     assert seen.integration_error < 1e-4
     assert seen.ledger_residual < 1e-3
     assert run["wall_energy"][-1] > 0.01
-
-
-def test_an_element_with_a_state_that_mujoco_does_not_know_is_refused() -> None:
-    with pytest.raises(
-        ValueRangeError, match=r"knows no such element; got spring; needs elements without a state"
-    ):
-        simulate_problem(with_parts(resolve(world()), elements=[Spring()]), "mujoco")

@@ -54,22 +54,6 @@ class Wall(AbstractElement):
         return none._replace(force=at.rotation.T @ force, lost=lost, stored=stored)
 
 
-@final
-@dataclass(frozen=True)
-class Spring(AbstractElement):
-    """With a state of its own, which nobody told MuJoCo of."""
-
-    acts: bool = True
-
-    def state(self, n: int) -> Layout:
-        """Return by how much it is stretched."""
-        return Layout((Field("stretch", (), "m", "of the spring"),))
-
-    def act(self, at: Touch, s: Any, m: Any) -> Effect:
-        """Return nothing."""
-        return nothing(at.x.q.numel())._replace(rate=cs.SX(0))
-
-
 @contact_of.register
 def _(element: Wall, numbers: Mapping[str, Any]) -> Contact:
     return Contact(

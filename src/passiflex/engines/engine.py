@@ -85,7 +85,7 @@ class MujocoEngine(AbstractEngine):
         return f"mujoco {mujoco_module().__version__}"
 
     def require(self, problem: Problem) -> None:
-        """Refuse what is in continuous time, and elements with a state, which MuJoCo would have to move.
+        """Refuse what is in continuous time, and surfaces that MuJoCo does not make.
 
         Raises
         ------
@@ -104,16 +104,7 @@ class MujocoEngine(AbstractEngine):
                 needs="`control: {rate: …}` in the scenario",
                 try_="the engine passiflex",
             )
-        n, made = problem.law.robot.n, contacts_of(problem)
-        if remember := [
-            e.name for e in problem.elements if e.acts and e.state(n).size and e.name not in made
-        ]:
-            raise ValueRangeError(
-                "the engine mujoco knows no such element",
-                got=", ".join(remember),
-                needs="elements without a state of their own",
-                try_="the engine passiflex",
-            )
+        contacts_of(problem)
 
     def prepared(self, problem: SampledProblem) -> SampledProblem:
         """Return the problem with what MuJoCo touches only felt."""

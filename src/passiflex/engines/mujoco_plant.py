@@ -13,7 +13,7 @@ from passiflex.engines.felt import Felt
 from passiflex.engines.mjcf import Options
 from passiflex.engines.mujoco_model import NOTHING, mujoco_model, mujoco_module
 from passiflex.engines.touching import Touching
-from passiflex.loops.moved import WEIGHTS, MovedLoop
+from passiflex.loops.moved import NODES, WEIGHTS, MovedLoop
 from passiflex.native import NativeFunction
 from passiflex.problems.problem import SampledProblem
 
@@ -50,7 +50,10 @@ class MujocoPlant:
         self._speed[:n], self._speed[n : 2 * n] = x[3 * n : 4 * n], x[2 * n : 3 * n]
         self._touching = Touching(self.model, self.data, contacts, plant) if contacts else None
         self._acts = any(e.acts for e in plant.elements if not isinstance(e, Felt))
-        self._stages = moved.passed.inputs[0].reshape(len(WEIGHTS), 4 * n)
+        self._stages = moved.passed.inputs[0].reshape(len(WEIGHTS), self._n_x)
+        self._rates, self._own_state = np.zeros((len(WEIGHTS), self._n_x - 4 * n)), x[4 * n :].copy()
+        felt = [plant.state.slices[f.name] for e in plant.elements if isinstance(e, Felt) for f in e.state(n)]
+        self._moves = np.setdiff1d(np.arange(4 * n, self._n_x), np.r_[(0, *felt)].astype(int))
         self._stage, self._given = 0, 0.0
         self._due, self._felt_since = 0.0, False
         moved.push.inputs[2][:] = moved.passed.inputs[2][:] = problem.plant
@@ -95,7 +98,9 @@ class MujocoPlant:
             self._felt_since = False
         passed.inputs[1][:], passed.inputs[3][:] = inputs, h
         passed.call()
+        self._own_state += h * (np.array(WEIGHTS) @ self._rates)
         self._read(y)
+        y[self._moves] = self._own_state[self._moves - 4 * n]
         y[self._n_x :] += passed.outputs[0]
 
     def _in_mujoco(self, function: Callable[[Any, Any], None]) -> None:
@@ -134,26 +139,30 @@ class MujocoPlant:
         x[2 * n : 3 * n], x[3 * n : 4 * n] = self._speed[n : 2 * n], self._speed[:n]
 
     def _staged(self, model: Any, data: Any) -> None:
-        """Note a stage, and add what the elements do to MuJoCo's passive forces."""
-        n, stage = self._n, self._stage
-        if stage < len(WEIGHTS):
-            if stage and self._touching is not None:
-                self._touched()
-            moving = self._stages[stage]
-            moving[: 2 * n], moving[2 * n :] = self._where, self._speed
+        """Note a stage, and add what the elements do to MuJoCo's passive forces; their states go along by its rule."""
+        n, stage, push = self._n, self._stage, self._moved.push
+        within = stage < len(WEIGHTS)
+        moving = self._stages[stage] if within else push.inputs[0]
+        moving[: 2 * n], moving[2 * n : 4 * n], moving[4 * n :] = self._where, self._speed, self._own_state
+        if within:
+            if stage:
+                moving[4 * n :] += NODES[stage] * self._step * self._rates[stage - 1]
+                if self._touching is not None:
+                    self._touched()
             self._stage = stage + 1
         if self._touching is not None and self._touching.crosses:
             self._touching.cross()
         if self._acts:
-            push = self._moved.push
-            push.inputs[0][: 2 * n], push.inputs[0][2 * n :] = self._where, self._speed
+            push.inputs[0][:] = moving
             push.call()
             self._passive += push.outputs[0]
+            if within:
+                self._rates[stage] = push.outputs[1]
 
     def _touched(self) -> None:
         """Add the power of the contacts in the stage before: their forces are known when it has ended."""
         n, before = self._n, self._stage - 1
-        self._given += WEIGHTS[before] * float(self._held[n:] @ self._stages[before, 3 * n :])
+        self._given += WEIGHTS[before] * float(self._held[n:] @ self._stages[before, 3 * n : 4 * n])
 
 
 def _silent(text: str) -> None:
