@@ -98,9 +98,10 @@ class MujocoPlant:
             self._felt_since = False
         passed.inputs[1][:], passed.inputs[3][:] = inputs, h
         passed.call()
-        self._own_state += h * (np.array(WEIGHTS) @ self._rates)
         self._read(y)
-        y[self._moves] = self._own_state[self._moves - 4 * n]
+        if self._moves.size:
+            self._own_state += h * (np.array(WEIGHTS) @ self._rates)
+            y[self._moves] = self._own_state[self._moves - 4 * n]
         y[self._n_x :] += passed.outputs[0]
 
     def _in_mujoco(self, function: Callable[[Any, Any], None]) -> None:
@@ -143,12 +144,14 @@ class MujocoPlant:
         n, stage, push = self._n, self._stage, self._moved.push
         within = stage < len(WEIGHTS)
         moving = self._stages[stage] if within else push.inputs[0]
-        moving[: 2 * n], moving[2 * n : 4 * n], moving[4 * n :] = self._where, self._speed, self._own_state
-        if within:
-            if stage:
+        moving[: 2 * n], moving[2 * n : 4 * n] = self._where, self._speed
+        if self._moves.size:
+            moving[4 * n :] = self._own_state
+            if within and stage:
                 moving[4 * n :] += NODES[stage] * self._step * self._rates[stage - 1]
-                if self._touching is not None:
-                    self._touched()
+        if within:
+            if stage and self._touching is not None:
+                self._touched()
             self._stage = stage + 1
         if self._touching is not None and self._touching.crosses:
             self._touching.cross()
