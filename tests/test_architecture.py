@@ -10,7 +10,7 @@ import pytest
 SOURCE = Path(__file__).parents[1] / "src" / "passiflex"
 MODULES = sorted(SOURCE.rglob("*.py"))
 
-FOUNDATION = ("version", "origin", "lazy", "errors", "layout", "parts", "files")
+FOUNDATION = ("version", "origin", "lazy", "errors", "extras", "layout", "parts", "files")
 ROOMS = (
     *FOUNDATION,
     "texts",
@@ -25,6 +25,7 @@ ROOMS = (
     "problems",
     "stability",
     "runs",
+    "engines",
     "simulation",
     "passivity",
     "metrics",

@@ -6,9 +6,9 @@
     print(pf.audit(run).verdict)
 
 The rooms, in the order in which they may import each other: `texts`, `robots`, `phs`, `control`, `sampled`, `elements`,
-`native`; `scenarios`, `loops`, `problems`, `stability`, `runs`, `simulation`; `passivity`, `metrics`, `limits`,
-`cards`, `chunks`, `campaigns`; then what looks at their results: `diagrams`, `plotting`, `reports`, `exports`; then
-`studies`, `cli`.
+`native`; `scenarios`, `loops`, `problems`, `stability`, `runs`, `engines`, `simulation`; `passivity`, `metrics`,
+`limits`, `cards`, `chunks`, `campaigns`; then what looks at their results: `diagrams`, `plotting`, `reports`,
+`exports`; then `studies`, `cli`.
 """
 
 from __future__ import annotations

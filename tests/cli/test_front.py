@@ -90,7 +90,7 @@ def test_the_commands_are_listed_by_what_one_wants(shell: Shell, arguments: list
         ["simulate", "reproduce", "robots"],
         ["robot", "robot", "card"],
         ["audit", "limits", "recommend"],
-        ["show", "plot", "export"],
+        ["show", "plot", "export", "export-model"],
         ["campaign", "replay", "search"],
     ]
     assert len(groups["for example:"]) == 3
@@ -139,7 +139,7 @@ def test_the_application_has_the_commands_of_the_table() -> None:
     for command in COMMANDS:
         *above, name = command.name.split()
         holder = app[above[0]] if above else app
-        assert holder[name].default_command.__name__ == name
+        assert holder[name].default_command.__name__ == name.replace("-", "_")
 
 
 @pytest.mark.parametrize("example", EXAMPLES)

@@ -12,7 +12,7 @@ import pytest
 from passiflex.errors import NameUnknownError
 from passiflex.exports import export_run
 from passiflex.exports.export import FORMATS, GROUP
-from passiflex.exports.extras import MissingExtraError
+from passiflex.extras import MissingExtraError
 from passiflex.files import OutputError
 from passiflex.simulation import Run
 

@@ -10,8 +10,8 @@ import numpy as np
 
 from native.carts import FIRST_COMMAND, GAINS, PERIOD, START, regulator
 from passiflex.native import Change, HeldLoop, LaneFunctions, LaneInputs, LaneLoop, LaneState, Samples
-from passiflex.native.held_loop import TOGETHER
 from passiflex.native.lane_data import LaneSamples
+from passiflex.native.python_loop import TOGETHER
 
 
 def period_row() -> cs.Function:

@@ -21,7 +21,7 @@ from native.carts import (
     told,
 )
 from passiflex.native import HELD_LOOP_DRIVER, HeldLoop, compile_functions, find_compiler
-from passiflex.native.held_loop import LONGEST_LINE, TOGETHER
+from passiflex.native.python_loop import LONGEST_LINE, TOGETHER
 
 ROUND = 1e-12
 """A hundred periods of sums of ten terms, of numbers up to 10; the loop is stable, errors do not grow."""

@@ -47,6 +47,7 @@ GROUPS = {
         Command("show", _SEEN + "show", "write a run as a page: the moving arm beside its signals"),
         Command("plot", _SEEN + "plot", "draw a run for a paper or a slide"),
         Command("export", _SEEN + "export", "write a run for Rerun, Foxglove, PlotJuggler, or as a table"),
+        Command("export-model", _SEEN + "export_model", "write a robot as a model for MuJoCo"),
     ),
     "many robots": (
         Command("campaign", _MANY + "campaign", "run a scenario for thousands of robots"),

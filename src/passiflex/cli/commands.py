@@ -57,6 +57,9 @@ def simulate(
     /,
     *,
     out: Annotated[Path, cyclopts.Parameter(help="netCDF file to write")],
+    engine: Annotated[
+        str, cyclopts.Parameter(help="who moves the robot of a sampled run: passiflex, or mujoco")
+    ] = "passiflex",
 ) -> int:
     """Run a scenario file and write the run as one netCDF file; exit status 2 if the run ended early."""
     from passiflex.files import require_writable
@@ -75,7 +78,9 @@ def simulate(
             for caution in cautions(problem):
                 console.print(f"note: {caution}")
             report(f"{read.name}: compiling and running")
-            run = simulate_problem(problem)
+            run = simulate_problem(problem, engine)
+        if run.moved_elsewhere:
+            console.print(f"moved by {run.engine}")
         if run.failure:
             console.print(f"the run ended early, at {run.time[-1]:g} s of {read.duration:g} s: {run.failure}")
         if run.sampled:
@@ -112,6 +117,8 @@ def audit(run: Path, /) -> int:
     decided = "least margin" if result.verdict == "passive" else "decided"
     console.print(f"{decided} at {result.time:g} s, most of it taken by: {result.term}")
     console.print(f"margin: {result.margin:.6g} J, integration error {result.integration_error:.1e} J")
+    if read.moved_elsewhere:
+        console.print(f"moved by {read.engine}")
     if not result.every_step:
         console.print("judged by the rows of the file alone: what happened between them was not noted")
     if result.ledger_residual > max(10 * result.integration_error, WORTH_A_WORD):

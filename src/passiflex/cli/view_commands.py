@@ -1,4 +1,4 @@
-"""The commands that look at runs: show, plot, export. They read damaged files too, and say what is wrong."""
+"""The commands that look at runs: show, plot, export, which read damaged files too; and export-model, for a robot."""
 
 from __future__ import annotations
 
@@ -105,6 +105,31 @@ def export(
         target = _target(out, f".{to}", (f".{to}",), run)
         (read,) = _read(run)
         console.print(f"wrote {export_run(read.run, target)}")
+    return 0
+
+
+def export_model(
+    what: str,
+    /,
+    *,
+    out: Annotated[Path, cyclopts.Parameter(help="MJCF file to write, that ends in .xml")],
+) -> int:
+    """Write a robot, or the robot of a scenario with what it carries and where it starts, as a model for MuJoCo."""
+    from passiflex.exports.model_file import export_model as export
+    from passiflex.files import require_writable
+    from passiflex.robots.flexible import FlexibleJointRobot
+    from passiflex.scenarios.scenario_file import is_scenario, load_scenario
+    from passiflex.simulation import resolve
+
+    with timed():
+        require_writable(out.parent)
+        if is_scenario(what):
+            cut = export(resolve(load_scenario(what)), out)
+        else:
+            cut = export(FlexibleJointRobot.load(what), out)
+        for line in cut:
+            console.print(f"note: {line}")
+        console.print(f"wrote {out}")
     return 0
 
 

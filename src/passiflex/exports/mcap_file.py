@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from passiflex.exports.extras import imported
 from passiflex.exports.ros2_definitions import definition_of
 from passiflex.exports.ros2_topics import topics_of
 from passiflex.exports.signals import signals_of
+from passiflex.extras import imported
 from passiflex.robots.solids import with_solids
 from passiflex.runs.run import Run
 from passiflex.runs.run_arm import chain_of

@@ -10,10 +10,10 @@ from uuid import uuid4
 import numpy as np
 
 from passiflex.diagrams import KINDS, Panel, Viewed, ideal_motion, marks_of, panels, spans_of
-from passiflex.exports.extras import imported
 from passiflex.exports.rerun_scene import log_scene
 from passiflex.exports.rerun_stream import GREY, PALETTE, TIMELINE, Stream
 from passiflex.exports.signals import signals_of
+from passiflex.extras import imported
 from passiflex.passivity import audit_if_possible
 from passiflex.runs.run import Run
 

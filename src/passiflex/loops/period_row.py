@@ -25,8 +25,13 @@ class PeriodRow:
     @cached_property
     def layout(self) -> Layout:
         """Return the row; the environment come first."""
+        return self.environment + self.told
+
+    @cached_property
+    def told(self) -> Layout:
+        """Return what the law is told: the row without the environment."""
         n, k = self.n, self.k
-        return self.environment + Layout(
+        return Layout(
             (
                 Field("desired_position", (3,), "m", "x_d", axes=("axis",)),
                 Field("desired_rotation", (3, 3), "1", "axes of x_d", axes=("axis", "column")),

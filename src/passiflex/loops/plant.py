@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from passiflex.control.motion import Pose
+from passiflex.control.signals import Measurement
 from passiflex.elements import AbstractElement, Drag, Effect, MotorFriction, Touch, nothing
 from passiflex.layout import Field, Layout, Signal
 from passiflex.robots.arm import TipWrench
@@ -184,6 +185,17 @@ class Plant:
     def _pushed(self, touched: Effect, x: cs.SX, s: Any, m: Any) -> Pushed:
         wrench = self._world_wrench(touched, x, s)
         return Pushed(wrench, self.robot.arm.jacobian(self.view(x).q, m).T @ wrench + touched.link)
+
+    def sense(self, x: cs.SX, s: Any, m: Any) -> Measurement:
+        """Return what there is to be measured of the state x."""
+        robot, pushed = self.view(x), self.pushed(x, s, m)
+        return Measurement(*robot, self.robot.joint_torque(robot, m), *pushed)
+
+    def touched(self, x: cs.SX, s: Any, m: Any) -> tuple[cs.SX, cs.SX]:
+        """Return what the elements do to the links and to the motors (n,) [N m]; F_e comes beside it."""
+        robot, effect = self.view(x), _sum(self._effects(self._touch(x, m), x, s, m), self.robot.n)
+        parts = (self.robot.arm.in_world_axes(robot.q, part) for part in (effect.force, effect.moment))
+        return self.robot.arm.jacobian(robot.q, m).T @ cs.vertcat(*parts) + effect.link, effect.motor
 
     def _world_wrench(self, touched: Effect, x: cs.SX, s: Any) -> cs.SX:
         parts = (

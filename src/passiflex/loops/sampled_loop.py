@@ -1,4 +1,4 @@
-"""One control period as a compiled function: sensors, controller, motor limits; and what is recorded of it."""
+"""A plant and what runs once per period, as compiled functions; and what is recorded of them."""
 
 from __future__ import annotations
 
@@ -10,20 +10,16 @@ import casadi as cs
 import numpy as np
 from numpy.typing import NDArray
 
-from passiflex.control.signals import Measurement
 from passiflex.layout import Field, Layout, Signal
-from passiflex.loops.claims import claimed_energies, outer_torque, shaped_motion
+from passiflex.loops.period_law import PeriodLaw
 from passiflex.loops.period_row import PeriodRow
 from passiflex.loops.plant import ELEMENTS, Elements, Plant
 from passiflex.loops.witness import LARGEST, Instant, Witness
 from passiflex.native import Watch
 from passiflex.parts import Parts
-from passiflex.robots.arm import EndEffectorPose
 from passiflex.sampled.controller import SampledController
-from passiflex.sampled.motors import limit_layout, limited
 from passiflex.sampled.rest import Rest
 from passiflex.sampled.sensors import AbstractSensorEffect, Sensors
-from passiflex.sampled.signals import ControlParameters, PeriodResult, Setpoint
 
 AT_ONCE = 1e-7
 """Two instants closer than this are one [s], after millions of periods; a law claims a level when it reads."""
@@ -49,9 +45,9 @@ class _Truth(NamedTuple):
 class SampledLoop:
     """Plant and controller as functions of flat vectors, ready for code generation.
 
-    `plant.rhs` is the plant; `control` is (x, c, row, p) → (c, command, signals), one period; `outputs` is
-    (x, command, environment, p) → what is true then; `period` makes the rows; `watch` is
-    the witness at work.
+    `plant.rhs` is the plant; `control` is (x, c, row, p) → (c, command, signals), one period: `plant.sense`, then the
+    `law`; `outputs` is (x, command, environment, p) → what is true then; `period` makes the rows; `watch` is the
+    witness at work.
     """
 
     controller: SampledController
@@ -65,32 +61,28 @@ class SampledLoop:
         return Plant(self.controller.law.robot, self.elements)
 
     @cached_property
+    def law(self) -> PeriodLaw:
+        """Return what runs once per period."""
+        return PeriodLaw(self.controller, self.effects)
+
+    @property
     def sensors(self) -> Sensors:
         """Return the sensors."""
-        return Sensors(self.controller.law.robot.n, self.effects)
+        return self.law.sensors
 
     @cached_property
     def parameters(self) -> Parts:
-        """Return the layouts of everything that `control` is told."""
-        own = self.controller.parameters
-        limits = limit_layout(self.controller.law.robot.n)
-        return Parts(
-            {"plant": self.plant.parameters, **own.layouts, "sensors": self.sensors.layout, "limits": limits}
-        )
+        """Return the layouts of everything that `control` is told: the plant's come first."""
+        return Parts({"plant": self.plant.parameters, **self.law.parameters.layouts})
 
-    @cached_property
+    @property
     def memory(self) -> Layout:
-        """Return the state of `control`: the sensors', the controller's, and the torque of the motors."""
-        n = self.controller.law.robot.n
-        told = "that the motors were last told to give"
-        torque = Field("applied_torque", (n,), "N m", told, kept=False, acts=True)
-        return self.sensors.state + self.controller.state + Layout((torque,))
+        """Return the state of `control`."""
+        return self.law.memory
 
     def start(self, at: Rest) -> NDArray[np.float64]:
         """Return the memory at rest, flat."""
-        return self.memory.pack(
-            self.sensors.start(at) | self.controller.start(at) | {"applied_torque": at.command}
-        )
+        return self.law.start(at)
 
     @cached_property
     def period(self) -> PeriodRow:
@@ -115,63 +107,12 @@ class SampledLoop:
 
     @cached_property
     def _period(self) -> _Period:
-        robot = self.controller.law.robot
         state, p = cs.SX.sym("x", self.plant.state.size), cs.SX.sym("p", self.parameters.size)
         memory, c = self.memory.symbols("c")
         row, w = self.row.symbols("row")
-        views, x = self.parameters.view(p), self.plant.view(state)
-        plant, limits = views["plant"], views["limits"]
-        (wrench, tau_e), tau_a = self.plant.pushed(state, w, plant), robot.joint_torque(x, plant)
-        y, read = self.sensors.read(
-            Measurement(*x, tau_a, wrench, tau_e), w.torque_noise, w.elapsed, c, views["sensors"]
-        )
-        setpoint = Setpoint(
-            EndEffectorPose(w.desired_position, w.desired_rotation),
-            w.desired_velocity,
-            w.desired_acceleration,
-            w.desired_stiffness,
-            w.desired_damping,
-            w.feedforward,
-        )
-        numbers = ControlParameters(**{part: views[part] for part in ControlParameters._fields})
-        start = self.sensors.state.size
-        own = memory[start : start + self.controller.state.size]
-        result = self.controller.step(y, setpoint, w.elapsed, c.applied_torque, own, numbers)
-        applied = limited(
-            result.command.tau_m, c.applied_torque, limits.torque_limit, limits.torque_rate_limit, w.elapsed
-        )
-        carried = robot.arm.potential_energy(y.q, views["model"])
-        return _Period(
-            (state, memory, row, p),
-            cs.vertcat(read, result.state, applied),
-            applied,
-            self._said(y, result, carried),
-        )
-
-    def _said(self, y: Measurement, result: PeriodResult, carried: cs.SX) -> tuple[Signal, ...]:
-        """Return what is recorded of a period."""
-        robot, command, entry = self.controller.law.robot, result.command, result.entry
-        n, (angle, speed, torque) = robot.n, robot.arm.chain.joint_units
-
-        def read(name: str, unit: str, symbol: str, value: cs.SX) -> Signal:
-            return Signal(Field(f"measured_{name}", (n,), unit, f"{symbol} as the sensors have it"), value)
-
-        believed = result.believed.tau_e
-        return (
-            read("q", angle, "q", y.q),
-            read("theta", angle, "θ", y.theta),
-            read("dq", speed, "q̇", y.dq),
-            read("dtheta", speed, "θ̇", y.dtheta),
-            read("tau_a", torque, "τ_a", y.tau_a),
-            Signal(Field("believed_tau_e", (n,), torque, "τ_e as the law believes it"), believed),
-            Signal(Field("commanded_torque", (n,), torque, "τ_m before the motors' limits"), command.tau_m),
-            outer_torque(robot, command),
-            *shaped_motion(robot, command),
-            *claimed_energies(command, carried, "x̂_d"),
-            Signal(Field("reference_share", (), "1", "γ of the reference"), entry.reference_share),
-            Signal(Field("stiffness_share", (), "1", "γ of the stiffness"), entry.stiffness_share),
-            Signal(Field("valve", (), "1", "β"), entry.valve),
-        )
+        views = self.parameters.view(p)
+        truth = self.plant.sense(state, w, views["plant"])
+        return _Period((state, memory, row, p), *self.law.step(truth, memory, c, w, views))
 
     @cached_property
     def control(self) -> cs.Function:
@@ -179,6 +120,22 @@ class SampledLoop:
         period = self._period
         told = [period.after, period.applied, self.signals.stack_of(period.signals)]
         return cs.Function("control", list(period.inputs), [cs.densify(v) for v in told], {"cse": True})
+
+    @cached_property
+    def sense(self) -> cs.Function:
+        """Return (x, environment, p) → what there is to be measured, with p as for the plant."""
+        x, (s, environment) = cs.SX.sym("x", self.plant.state.size), self.plant.environment.symbols("s")
+        p, m = self.plant.parameters.symbols("p")
+        measured = cs.vertcat(*self.plant.sense(x, environment, m))
+        return cs.Function("sense", [x, s, p], [cs.densify(measured)], {"cse": True})
+
+    @cached_property
+    def law_alone(self) -> cs.Function:
+        """Return (measured, c, row without environment, p without the plant's) → (c, command, signals).
+
+        It is one period of `control` for those who have a plant of their own.
+        """
+        return self.law.function(self.period.told)
 
     @cached_property
     def _truth(self) -> _Truth:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import ctypes
 import math
 from pathlib import Path
-from typing import NamedTuple
 
 import casadi as cs
 import numpy as np
@@ -13,47 +12,19 @@ from numpy.typing import ArrayLike, NDArray
 
 from passiflex.errors import SizeError, ValueRangeError
 from passiflex.native.entry import Callable, Entry, address
-from passiflex.native.fixed_step import step_function
-from passiflex.native.function import NativeFunction
 from passiflex.native.library import c_source
 from passiflex.native.loop_state import LoopState, Samples, Watch
+from passiflex.native.python_loop import LONGEST_LINE, Call, InMachine, Mover, walk
 
 Array = NDArray[np.float64]
 
 HELD_LOOP_DRIVER = c_source("held_loop.c")
 """The C text that `compile_functions` must append to a library that `HeldLoop` is to use."""
 
-LONGEST_LINE = 64
-"""Commands that may be on their way at one time."""
-TOGETHER = 1e-9
-"""Two instants closer than this share of a period are one."""
-
-
 _ROUTINE = [
     *[ctypes.c_void_p] * 15, *[ctypes.c_longlong] * 3, *[ctypes.c_double] * 2, ctypes.c_longlong,
     *[ctypes.c_void_p] * 2,
 ]  # fmt: skip
-
-
-class _Call(NamedTuple):
-    """The arguments of one call; `y`, `c`, `line`, `z`, `w` and `out` are written to."""
-
-    y: Array
-    c: Array
-    line: Array
-    z: Array
-    w: Array
-    rows: Array
-    timing: Array
-    p_plant: Array
-    p_control: Array
-    p_watch: Array | None
-    first: int
-    steps: int
-    period: float
-    longest: float
-    record_every: int
-    out: Array
 
 
 class HeldLoop:
@@ -68,6 +39,7 @@ class HeldLoop:
     library: What `compile_functions([plant, control, …], driver=HELD_LOOP_DRIVER)` returned; None runs
         CasADi's virtual machine.
     watch: What sees every sample and every step; its functions are in the library too.
+    mover: Who moves the plant and runs the law in their place, period by period from Python.
     """
 
     def __init__(
@@ -76,6 +48,7 @@ class HeldLoop:
         control: cs.Function,
         library: Path | None = None,
         watch: Watch | None = None,
+        mover: Mover | None = None,
     ):
         if not _fit(plant, control):
             raise SizeError(
@@ -91,14 +64,13 @@ class HeldLoop:
         self.n_line = 1 + self.n_u + LONGEST_LINE * (1 + self.n_u)
         self.n_m, self.n_p_watch = (watch.size, watch.parameters) if watch is not None else (0, 0)
         self._entries: list[Entry | None] | None = None
-        self._watch: list[NativeFunction] = []
-        if library is not None:
+        self._mover: Mover | None = mover
+        if mover is None and library is not None:
             self._entries = [Entry(library, f.name()) for f in (plant, control, *(watch or ()))]
             self._entries += [None] * (4 - len(self._entries))
             self._routine = Entry(library, plant.name()).routine("passiflex_held_loop", _ROUTINE)
-        else:
-            self._step, self._law = NativeFunction(step_function(plant)), NativeFunction(control)
-            self._watch = [NativeFunction(f) for f in watch or ()]
+        elif mover is None:
+            self._mover = InMachine(plant, control, watch)
 
     def start(self, x: ArrayLike, controller: ArrayLike, command: ArrayLike) -> LoopState:
         """Return the state before the first sample, with `command` in force."""
@@ -161,7 +133,7 @@ class HeldLoop:
             _column("p_control", p_control, self.n_p_control),
             None if p_watch is None else _column("p_watch", p_watch, self.n_p_watch),
         )
-        call = _Call(
+        call = Call(
             y,
             c,
             line,
@@ -177,13 +149,18 @@ class HeldLoop:
             record_every,
             out,
         )
-        completed = self._in_machine(call) if self._entries is None else self._in_c(call, self._entries)
+        if self._entries is not None:
+            completed = self._in_c(call, self._entries)
+        else:
+            assert self._mover is not None
+            completed = walk(call, self._mover, self.n_u, self.n_s)
         ends = np.cumsum([self.n_x, self.n_q, self.n_c, self.n_u])
         x, quads, memory, command, signals = np.split(out, ends, axis=1)
         after = LoopState(y[: self.n_x], y[self.n_x :], c, line, z, w)
-        return Samples(x, quads, memory, command, signals, completed, after)
+        why = self._mover.why if self._mover is not None else ""
+        return Samples(x, quads, memory, command, signals, completed, after, why)
 
-    def _in_c(self, call: _Call, entries: list[Entry | None]) -> int:
+    def _in_c(self, call: Call, entries: list[Entry | None]) -> int:
         shown = entries if call.p_watch is not None else [*entries[:2], None, None]
         callables = [Callable.of(entry) if entry is not None else None for entry in shown]
         sizes = np.array(
@@ -211,59 +188,6 @@ class HeldLoop:
                 needs=f"0 to {LONGEST_LINE - 3} periods",
             )
         return rows, timing
-
-    def _in_machine(self, call: _Call) -> int:
-        (
-            y,
-            c,
-            line,
-            z,
-            w,
-            rows,
-            timing,
-            p_plant,
-            p_control,
-            p_watch,
-            first,
-            steps,
-            period,
-            longest,
-            every,
-            out,
-        ) = call
-        held, queue = line[1 : 1 + self.n_u], line[1 + self.n_u :].reshape(LONGEST_LINE, 1 + self.n_u)
-        for k, (row, (delay, runs)) in enumerate(zip(rows, timing, strict=True)):
-            if runs:
-                waiting = int(line[0])
-                c[:], command, z[:] = self._law(y[: self.n_x], c, row, p_control)
-                queue[waiting, 0] = max(delay, queue[waiting - 1, 0] if waiting else 0.0)
-                queue[waiting, 1:] = command
-                line[0] += 1
-            t = 0.0
-            while True:
-                while line[0] and queue[0, 0] <= t + TOGETHER * period:
-                    held[:] = queue[0, 1:]
-                    queue[:-1] = queue[1:].copy()
-                    line[0] -= 1
-                if t == 0.0 and self._watch and p_watch is not None:
-                    w[:] = self._watch[0](w, (first + k) * period, y, held, c, z, p_watch)
-                if t == 0.0 and k % every == 0:
-                    out[k // every] = np.concatenate([y, c, held, z])
-                if k >= steps or t >= period:
-                    break
-                until = min(queue[0, 0], period) if line[0] else period
-                count = max(1, math.ceil((until - t) / longest * (1 - 1e-12)))
-                inputs = np.concatenate([held, row[: self.n_s]])
-                h = (until - t) / count
-                for i in range(count):
-                    y[:] = self._step(y, inputs, p_plant, h)
-                    if self._watch and p_watch is not None:
-                        w[:] = self._watch[1](w, (first + k) * period + (t + (i + 1) * h), y, p_watch)
-                t = until
-            queue[: int(line[0]), 0] -= period
-            if not np.isfinite(y).all():
-                return k
-        return len(rows)
 
 
 def _fit(plant: cs.Function, control: cs.Function) -> bool:

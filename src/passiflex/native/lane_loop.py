@@ -12,11 +12,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from passiflex.errors import SizeError, ValueRangeError
 from passiflex.native.entry import address
-from passiflex.native.held_loop import LONGEST_LINE
 from passiflex.native.lane_data import LaneInputs, LaneSamples, LaneState, aligned
 from passiflex.native.lane_source import lane_source
 from passiflex.native.library import c_source, compile_source
 from passiflex.native.loop_state import LoopState, Watch
+from passiflex.native.python_loop import LONGEST_LINE
 
 Array = NDArray[np.float64]
 

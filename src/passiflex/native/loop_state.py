@@ -58,8 +58,8 @@ class LoopState(NamedTuple):
 class Samples(NamedTuple):
     """Recorded samples, each taken after the controller ran.
 
-    `completed` below the number of rows is the sample at which a number ceased to be finite; rows that
-    were not reached are NaN.
+    `completed` below the number of rows is the sample at which a number ceased to be finite, or at which who moves the
+    plant could go no further, and said `why`; rows that were not reached are NaN.
     """
 
     x: Array
@@ -69,3 +69,4 @@ class Samples(NamedTuple):
     signals: Array
     completed: int
     state: LoopState
+    why: str = ""

@@ -46,6 +46,7 @@ def facts(run: Run, scenario: Scenario | None) -> Facts:
         found.append(("tank", _tank(scenario)))
         found += _world(scenario)
     found.append(("duration", _duration(run)))
+    found += [("moved by", run.engine)] if run.moved_elsewhere else []
     found += [("limit passed", str(passed)) for passed in passed_limits(run)]
     found += [("seed", str(attributes["seed"]))] if "seed" in attributes else []
     return found

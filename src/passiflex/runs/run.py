@@ -70,6 +70,16 @@ class Run:
         return parts_said(str(self.data.attrs.get("scenario", "")))
 
     @property
+    def engine(self) -> str:
+        """Return what moved the plant, with its version; empty in a file of before, when there was one way."""
+        return str(self.data.attrs.get("engine", ""))
+
+    @property
+    def moved_elsewhere(self) -> bool:
+        """Return whether another simulator moved the plant."""
+        return bool(self.engine) and not self.engine.startswith("passiflex")
+
+    @property
     def sampled(self) -> bool:
         """Return whether the law ran once per control period."""
         return bool(self.data.attrs["control_period"])
@@ -195,8 +205,9 @@ def assemble(
     events: list[dict[str, Any]],
     failure: str,
     noted: Noted,
+    engine: str,
 ) -> Run:
-    """Return the run of recorded rows, and of what was noted at every step."""
+    """Return the run of recorded rows, and of what was noted at every step, by the engine that moved the plant."""
     variables: dict[str, Any] = {}
     for layout, numbers in recorded:
         values = layout.unpack(numbers)
@@ -213,7 +224,7 @@ def assemble(
     coordinates: dict[str, Any] = {k: v for k, v in COORDINATES.items() if k in used}
     coordinates["joint"] = np.arange(1, robot.n + 1)
     coordinates["time"] = ("time", time, {"units": "s", "long_name": "time"})
-    attributes = _attributes(problem) | {"events": json.dumps(events), "failure": failure}
+    attributes = _attributes(problem) | {"events": json.dumps(events), "failure": failure, "engine": engine}
     return Run(xr.Dataset(variables, coordinates, attributes))
 
 

@@ -64,6 +64,7 @@ KINDS: dict[str, Any] = {
     "control_period": Positive,
     "version": Name,
     "commit": Name,
+    "engine": Name,
     "events": Annotated[str, Field(max_length=MAX_BYTES), AfterValidator(_events)],
     "failure": Text,
     "duration": Positive,

@@ -10,6 +10,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from passiflex.engines.engine import NATIVE
 from passiflex.errors import NameUnknownError, SimulationError
 from passiflex.loops.compiled import CompiledSampledLoop, compiled_sampled_loop, structure
 from passiflex.loops.recorded import sample_parts
@@ -270,4 +271,4 @@ def simulate_in_lane(problem: SampledProblem) -> Run:
         for layout in layouts
     ]
     noted = Noted(loop.witness.extremes, recording.noted)
-    return assemble(problem, recording.time, rows, [], recording.failure, noted)
+    return assemble(problem, recording.time, rows, [], recording.failure, noted, NATIVE.version)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from passiflex.elements import Mobility
+from passiflex.engines.engine import NATIVE, AbstractEngine
 from passiflex.errors import SimulationError
 from passiflex.loops.compiled import CompiledSampledLoop, compiled_sampled_loop
 from passiflex.loops.recorded import sample_parts
@@ -33,7 +34,7 @@ MOST_STEPS = 200_000_000
 """Steps of one run at most, about two minutes."""
 
 
-def simulate_sampled(problem: SampledProblem) -> Run:
+def simulate_sampled(problem: SampledProblem, engine: AbstractEngine = NATIVE) -> Run:
     """Return the run of a sampled problem.
 
     A run that leaves the finite numbers ends there, and says so in `Run.failure`.
@@ -44,12 +45,13 @@ def simulate_sampled(problem: SampledProblem) -> Run:
         If the loop is unstable at its rate and delay, and the scenario does not allow_unstable.
     """
     require_stable(problem)
-    return simulate_unchecked(problem)
+    return simulate_unchecked(problem, engine)
 
 
-def simulate_unchecked(problem: SampledProblem) -> Run:
+def simulate_unchecked(problem: SampledProblem, engine: AbstractEngine = NATIVE) -> Run:
     """Return the run of a sampled problem, stable or not."""
-    return _record(charged(problem), compiled_sampled_loop(problem.loop))
+    moved = engine.prepared(charged(problem))
+    return _record(moved, compiled_sampled_loop(moved.loop), engine)
 
 
 def start(problem: SampledProblem, compiled: CompiledSampledLoop) -> LoopState:
@@ -99,10 +101,11 @@ def left_finite(time: float) -> str:
     return f"the state left the finite numbers {time:.4g} s after the start"
 
 
-def _record(problem: SampledProblem, compiled: CompiledSampledLoop) -> Run:
-    loop, held = compiled.loop, compiled.held
+def _record(problem: SampledProblem, compiled: CompiledSampledLoop, engine: AbstractEngine) -> Run:
+    loop = compiled.loop
     state = start(problem, compiled)
     longest = longest_step(problem, compiled.plant)
+    held = engine.held(problem, compiled, state.x, longest)
     every = round(problem.output_interval / problem.period)
     rows = PeriodRows(problem, loop.period, compiled.row)
     chunks: list[list[Array]] = []
@@ -131,14 +134,19 @@ def _record(problem: SampledProblem, compiled: CompiledSampledLoop) -> Run:
         parts = (done.x, done.quads, done.controller, done.command, done.signals, told[::every])
         chunks.append([part[:good] for part in parts])
         if done.completed < count:
-            failure = left_finite((first + done.completed) * problem.period)
+            failure = done.why or left_finite((first + done.completed) * problem.period)
             break
     seen = [np.vstack(part) for part in zip(*chunks, strict=True)]
-    return _assemble(problem, compiled, seen, failure, witness.noted(state.watched))
+    return _assemble(problem, compiled, seen, failure, witness.noted(state.watched), engine)
 
 
 def _assemble(
-    problem: SampledProblem, compiled: CompiledSampledLoop, seen: list[Array], failure: str, noted: Noted
+    problem: SampledProblem,
+    compiled: CompiledSampledLoop,
+    seen: list[Array],
+    failure: str,
+    noted: Noted,
+    engine: AbstractEngine,
 ) -> Run:
     parts = sample_parts(compiled.loop)
     x, _, _, command, _, rows = seen
@@ -151,7 +159,7 @@ def _assemble(
         recorded.append(Recorded(layout.kept, numbers[:count, layout.columns(lambda f: f.kept)]))
     every = round(problem.output_interval / problem.period)
     time: Array = np.arange(count, dtype=np.float64) * (problem.period * every)
-    return assemble(problem, time, recorded, [], failure, noted)
+    return assemble(problem, time, recorded, [], failure, noted, engine.version)
 
 
 def _whole_rows(parts: list[Array]) -> int:

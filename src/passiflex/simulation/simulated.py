@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from passiflex.control.law import AbstractLaw
 from passiflex.elements import AbstractElement
+from passiflex.engines.engine import NATIVE
 from passiflex.problems.own_parts import with_parts
 from passiflex.problems.resolution import resolve
 from passiflex.runs.run import Run
@@ -30,6 +31,7 @@ def simulate(
     elements: Sequence[AbstractElement] = (),
     sensors: Sequence[AbstractSensorEffect] = (),
     reference: Sequence[AbstractReferenceEvent] = (),
+    engine: str = NATIVE.name,
 ) -> Run:
     """Return the run of a scenario, of a mapping with the entries of a scenario file, or of the file at a path.
 
@@ -38,6 +40,7 @@ def simulate(
     Parameters
     ----------
     law, gains, tank, elements, sensors, reference: Parts of your own, as `problems.own_parts.with_parts` takes them.
+    engine: Who moves the plant of a sampled run: "passiflex", or "mujoco" with the extra of this name.
 
     Raises
     ------
@@ -48,4 +51,4 @@ def simulate(
     own = with_parts(
         problem, law=law, gains=gains, tank=tank, elements=elements, sensors=sensors, reference=reference
     )
-    return simulate_problem(own)
+    return simulate_problem(own, engine)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from passiflex.control.motion import MOTION, Motion, Pose, between, hold, pose_at, shifted
 from passiflex.control.posture import posture
 from passiflex.control.tank import jump_cost
+from passiflex.engines.engine import NATIVE, engine_called
 from passiflex.errors import SimulationError
 from passiflex.loops.closed_loop import ClosedLoop
 from passiflex.loops.compiled import CompiledLoop, compiled_loop
@@ -42,18 +43,28 @@ NOTHING = 1e-12
 MOST_ROWS = 2_000_000
 
 
-def simulate_problem(problem: Problem) -> Run:
+def simulate_problem(problem: Problem, engine: str = NATIVE.name) -> Run:
     """Return the run of a problem.
 
     A run that leaves the finite numbers, or that the integrator gives up on, is a result too: it ends
     there, and says so in `Run.failure`.
 
+    Parameters
+    ----------
+    engine: Who moves the plant, a name of `engines.engine.ENGINES`.
+
     Raises
     ------
+    NameUnknownError, MissingExtraError, ValueRangeError
+        For an engine that there is not, or that is not installed, or that cannot run this problem.
     SimulationError
         If the start is not finite, or the events do not fit the noise's hold time.
     """
-    return simulate_sampled(problem) if isinstance(problem, SampledProblem) else _Simulation(problem).run()
+    moving = engine_called(engine)
+    moving.require(problem)
+    if isinstance(problem, SampledProblem):
+        return simulate_sampled(problem, moving)
+    return _Simulation(problem).run()
 
 
 class _Record:
@@ -140,7 +151,7 @@ class _Simulation:
         parts = zip(instant_parts(loop), (states, energies, outputs), strict=True)
         recorded = [Recorded(layout, numbers) for layout, numbers in parts]
         noted = loop.witness.noted(self.watched.memory)
-        return assemble(problem, record.time[:good], recorded, self.log, failure, noted)
+        return assemble(problem, record.time[:good], recorded, self.log, failure, noted, NATIVE.version)
 
     def _draw_noise(self, n: int) -> Array | None:
         noise = self.problem.noise

@@ -9,7 +9,7 @@ from passiflex.errors import PassiflexError
 
 
 class MissingExtraError(PassiflexError):
-    """A package that an export needs is not installed."""
+    """A package that is asked for is not installed."""
 
 
 def imported(module: str, extra: str, purpose: str) -> Any:

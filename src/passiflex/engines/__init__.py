@@ -1,0 +1,1 @@
+"""Other simulators that a sampled loop may run on, in place of the native one."""
