@@ -10,6 +10,9 @@ import casadi as cs
 from passiflex.control.motion import MOTION, reference_at
 from passiflex.layout import Field, Layout
 
+SHORTEST = 1e-9
+"""Two instants closer than this are one [s]: gains that go over meanwhile are there at once."""
+
 
 @dataclass(frozen=True)
 class PeriodRow:
@@ -52,6 +55,7 @@ class PeriodRow:
             Field("new_damping", (k, k), "N s/m, N s, N m s/rad", "and after it"),
             Field("change_from", (), "s", "when the change of gains begins"),
             Field("change_to", (), "s", "when it has ended"),
+            Field("change_linear", (), "1", "1 if it goes linearly, 0 with minimum jerk"),
             Field("feedforward", (6,), "N, N m", "wrench that the end effector is to exert"),
         )
         return self.environment + MOTION + Layout(own)
@@ -63,7 +67,7 @@ class PeriodRow:
 
     @cached_property
     def function(self) -> cs.Function:
-        """Return (time, schedule, drawn) → row. Gains go over to others with minimum jerk."""
+        """Return (time, schedule, drawn) → row. Gains go over to others with minimum jerk, linearly, or at once."""
         time = cs.SX.sym("time")
         schedule, c = self.schedule.symbols("schedule")
         drawn, chance = self.drawn.symbols("drawn")
@@ -74,8 +78,10 @@ class PeriodRow:
             "known", [clock, schedule], [*motion.pose, motion.velocity, acceleration], {"cse": True}
         )
         position, rotation, velocity, acceleration = known(cs.fmax(time - c.began, 0), schedule)
-        s = cs.fmin(cs.fmax((time - c.change_from) / (c.change_to - c.change_from), 0), 1)
-        blend = s**3 * (10 - 15 * s + 6 * s**2)
+        lasts = c.change_to - c.change_from
+        s = cs.fmin(cs.fmax((time - c.change_from) / cs.fmax(lasts, SHORTEST), 0), 1)
+        s = cs.if_else(lasts > SHORTEST, s, 1)
+        blend = cs.if_else(c.change_linear > 0, s, s**3 * (10 - 15 * s + 6 * s**2))
         values = {f.name: getattr(c, f.name) for f in self.environment} | {
             "desired_position": position,
             "desired_rotation": rotation,

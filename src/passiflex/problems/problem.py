@@ -24,6 +24,8 @@ from passiflex.sampled.sensors import AbstractSensorEffect
 
 Array = NDArray[np.float64]
 NOTHING: Mapping[str, float] = MappingProxyType({})
+MOST_JUDGED = 40
+"""Gains that a scenario goes over to, of which each is judged."""
 
 
 class Event(NamedTuple):
@@ -60,12 +62,16 @@ class TankStart(NamedTuple):
 
 
 class GainChange(NamedTuple):
-    """From `start` to `end` [s], K_x and D_x go over to these values (k, k) with minimum jerk."""
+    """From `start` to `end` [s], K_x and D_x go over to these values (k, k): with minimum jerk, or linearly.
+
+    Where the two instants are one, they are there at once.
+    """
 
     start: float
     end: float
     stiffness: Array
     damping: Array
+    linear: bool = False
 
 
 class Lasting(NamedTuple):
@@ -164,6 +170,21 @@ class SampledProblem(Problem):
     def loop(self) -> SampledLoop:
         """Return the loop that runs."""
         return SampledLoop(self.controller, self.elements, self.effects)
+
+    @cached_property
+    def told_gains(self) -> tuple[GainChange, ...]:
+        """Return those of the changes of gains that a judge looks at: each once, and of very many the extremes.
+
+        Those are the ones with the least and the largest of each number on the diagonals, and some in between.
+        """
+        different = {(c.stiffness.tobytes(), c.damping.tobytes()): c for c in self.gain_changes}
+        changes = tuple(different.values())
+        if len(changes) <= MOST_JUDGED:
+            return changes
+        numbers = np.array([np.concatenate([np.diag(c.stiffness), np.diag(c.damping)]) for c in changes])
+        between = np.linspace(0, len(changes) - 1, MOST_JUDGED - 2 * numbers.shape[1]).astype(int)
+        which = {*numbers.argmin(axis=0).tolist(), *numbers.argmax(axis=0).tolist(), *between.tolist()}
+        return tuple(changes[i] for i in sorted(which))
 
     @cached_property
     def parts(self) -> Parts:
