@@ -24,6 +24,7 @@ from passiflex.sampled.sensors import UNFILTERED
 from passiflex.scenarios.control_settings import Actions, Control, MotorSettings, SensorSettings
 from passiflex.scenarios.noise_settings import Noise
 from passiflex.scenarios.scenario import Scenario
+from passiflex.scenarios.setpoints import Table
 from passiflex.scenarios.tank_settings import TankSettings
 
 Array = NDArray[np.float64]
@@ -241,6 +242,16 @@ def _limits(motors: MotorSettings, robot: FlexibleJointRobot) -> dict[str, Array
 def _gain_changes(scenario: Scenario, gains: dict[str, Array]) -> tuple[GainChange, ...]:
     stiffness, damping = gains["stiffness"], gains["damping"]
     changes = []
+    begins = [*(event.at for event in scenario.reference[1:]), scenario.duration]
+    for event, end in zip(scenario.reference, begins, strict=False):
+        if not isinstance(event, Table):
+            continue
+        for row in event.gains(scenario.seed):
+            if row.start >= end:
+                break
+            stiffness = stiffness if row.stiffness is None else row.stiffness
+            damping = damping if row.damping is None else row.damping
+            changes.append(GainChange(row.start, row.end, stiffness, damping, event.between == "linear"))
     for change in scenario.gain_changes:
         stiffness = stiffness if change.stiffness is None else change.stiffness.full()
         damping = damping if change.damping is None else change.damping.full()

@@ -15,9 +15,11 @@ from passiflex.problems.resolution import resolve
 from passiflex.runs.run import Run
 from passiflex.sampled.sensors import AbstractSensorEffect
 from passiflex.sampled.tank import AbstractTank
+from passiflex.scenarios.path import ViaPath
 from passiflex.scenarios.reference import AbstractReferenceEvent
 from passiflex.scenarios.scenario import Scenario
 from passiflex.scenarios.scenario_file import as_scenario
+from passiflex.scenarios.setpoints import Table
 from passiflex.simulation.through_time import simulate_problem
 
 
@@ -44,7 +46,16 @@ def simulate(
     PassiflexError
         If the scenario has mistakes or does not fit its robot, or parts do not fit the scenario.
     """
-    problem = resolve(as_scenario(scenario))
+    given = as_scenario(scenario)
+    known: list[
+        AbstractReferenceEvent
+    ] = []  # what a scenario can write down, so that the run can be made again
+    if isinstance(reference, Sequence):
+        known = [event for event in reference if isinstance(event, ViaPath | Table)]
+        reference = [event for event in reference if not isinstance(event, ViaPath | Table)]
+    if known:
+        given = given.changed(reference=sorted([*given.reference, *known], key=lambda event: event.at))
+    problem = resolve(given)
     own = with_parts(
         problem, law=law, gains=gains, tank=tank, elements=elements, sensors=sensors, reference=reference
     )
