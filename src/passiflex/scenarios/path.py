@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Annotated, Literal, Self
+from typing import TYPE_CHECKING, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from passiflex.scenarios.reference import KINDS, ZERO, AbstractReferenceEvent, Length, Turn
 from passiflex.scenarios.spans import Seconds
@@ -43,14 +43,19 @@ class ViaPath(AbstractReferenceEvent):
     """The reference passes points, from where it is."""
 
     kind: Literal["path"] = Field(description=KINDS)
-    points: Annotated[tuple[ViaPoint, ...], Field(min_length=1)] = Field(
-        description="the points, in the order of time; its table is below"
-    )
+    points: tuple[ViaPoint, ...] = Field(description="the points, in the order of time")
     between: Between = Field(
         default="smooth",
         description="smooth: through the points without a rest, with least jerk; minimum_jerk: with a rest at each; "
         "linear: straight on",
     )
+
+    @field_validator("points")
+    @classmethod
+    def _any(cls, points: tuple[ViaPoint, ...]) -> tuple[ViaPoint, ...]:
+        if not points:
+            raise ValueError("needs at least one point, as {after: 1 s, by: [0, 0, 0.1]}")
+        return points
 
     def build(self, now: Pose) -> Motion:
         """Return the first of its motions."""

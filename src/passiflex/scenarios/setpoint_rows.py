@@ -26,6 +26,11 @@ SYMMETRIC = 1e-9
 """Share of the largest entry by which a matrix and its transpose may differ: what ten digits leave."""
 
 
+def gain_names(letter: str, size: int, *, in_full: bool = False) -> tuple[str, ...]:
+    """Return the columns of K_x (`k`) or D_x (`d`) for a task of this size, of their diagonals or in full."""
+    return _full(letter, size) if in_full else _diagonal(letter, size)
+
+
 def _diagonal(letter: str, size: int) -> tuple[str, ...]:
     return tuple(f"{letter}{axis}" for axis in AXES[:size])
 

@@ -31,7 +31,7 @@ def simulate(
     tank: AbstractTank | None = None,
     elements: Sequence[AbstractElement] = (),
     sensors: Sequence[AbstractSensorEffect] = (),
-    reference: Sequence[AbstractReferenceEvent] = (),
+    reference: Sequence[AbstractReferenceEvent] | AbstractReferenceEvent = (),
 ) -> Run:
     """Return the run of a scenario, of a mapping with the entries of a scenario file, or of the file at a path.
 
@@ -40,6 +40,7 @@ def simulate(
     Parameters
     ----------
     law, gains, tank, elements, sensors, reference: Parts of your own, as `problems.own_parts.with_parts` takes them.
+        A table of set-points and a path become part of the scenario, which then gives the same run again.
 
     Raises
     ------
@@ -47,6 +48,7 @@ def simulate(
         If the scenario has mistakes or does not fit its robot, or parts do not fit the scenario.
     """
     given = as_scenario(scenario)
+    reference = [reference] if isinstance(reference, AbstractReferenceEvent) else reference
     known: list[
         AbstractReferenceEvent
     ] = []  # what a scenario can write down, so that the run can be made again
