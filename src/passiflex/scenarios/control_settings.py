@@ -251,6 +251,10 @@ def gain_mistakes(given: Fallback | GainChange, task: str, free: tuple[int, ...]
         try:
             if part is None:
                 continue
+            if part.in_tool and isinstance(given, Fallback):
+                raise Mistakes(
+                    (("axes",), "the fallback holds one pose; give its gains in axes of the world")
+                )
             part.require(task)
         except Mistakes as mistakes:
             found += [((name, *place), text) for place, text in mistakes.entries]

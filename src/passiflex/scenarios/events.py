@@ -37,6 +37,8 @@ def event_mistakes(
                 found.append(
                     ((i, "table"), event.where("has gains, which need `control`; remove k.. and d.."))
                 )
+            if event.in_tool and any(k < 3 for k in law.stiffness.free):
+                found.append(((i, "axes"), "a free translation is one of the world; remove axes: tool"))
             size = 3 if law.task == "position" else 6
             if mistake := gain_mistake(event.numbers, size, law.stiffness.free):
                 found.append(((i, "table"), event.where(mistake)))

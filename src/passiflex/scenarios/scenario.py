@@ -169,6 +169,18 @@ class Scenario(Section):
         return control
 
     @model_validator(mode="after")
+    def _tool_axes_only_sampled(self) -> Self:
+        found = [name for name in ("stiffness", "damping") if getattr(self.law, name).in_tool]
+        if self.control is None and found:
+            raise Mistakes(
+                *(
+                    (("law", name, "axes"), "tool needs `control`, in which each turn of them is paid for")
+                    for name in found
+                )
+            )
+        return self
+
+    @model_validator(mode="after")
     def _tank_with_a_use(self) -> Self:
         gating = self.control is None or self.actions or self.feedforward
         try:

@@ -77,6 +77,10 @@ class Table(AbstractReferenceEvent):
         description="x,y,z and turns are from where the reference is when the table begins, in world axes; in place "
         "of the world",
     )
+    axes: Literal["world", "tool"] = Field(
+        default="world",
+        description="of the gains: as in the law, or all in the axes of the reference, that turn with it",
+    )
     stream: Stream | None = Field(
         default=None,
         description="the rows come as messages, late and not all of them; as they are if left out",
@@ -139,6 +143,11 @@ class Table(AbstractReferenceEvent):
     def turns(self) -> bool:
         """Return whether it has an orientation."""
         return self.numbers.turn is not None
+
+    @property
+    def in_tool(self) -> bool:
+        """Return whether its gains are in the axes of the reference throughout."""
+        return self.axes == "tool"
 
     @property
     def changes_gains(self) -> bool:

@@ -152,6 +152,8 @@ class _Walk:
             "change_from": new.start,
             "change_to": new.end,
             "change_linear": float(new.linear),
+            "old_in_tool": np.array(old.in_tool, dtype=float),
+            "new_in_tool": np.array(new.in_tool, dtype=float),
             "old_stiffness": old.stiffness,
             "new_stiffness": new.stiffness,
             "old_damping": old.damping,

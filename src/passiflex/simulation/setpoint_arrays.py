@@ -30,6 +30,7 @@ def setpoint_table(
     at: float = 0.0,
     between: Literal["held", "linear", "minimum_jerk", "smooth"] = "linear",
     relative: bool = False,
+    axes: Literal["world", "tool"] = "world",
     stream: Stream | dict[str, Any] | None = None,
 ) -> Table:
     """Return a table of set-points for `simulate(…, reference=…)`, or for `reference` of a scenario.
@@ -42,7 +43,7 @@ def setpoint_table(
         rotations.
     velocity, spin: (N, 3) m/s and rad/s at the rows, with `between="smooth"`.
     stiffness, damping: K_x and D_x, their diagonals (N, k) or the whole (N, k, k).
-    at, between, relative, stream: As in a scenario file.
+    at, between, relative, axes, stream: As in a scenario file.
 
     Raises
     ------
@@ -87,6 +88,7 @@ def setpoint_table(
         "at": at,
         "between": between,
         "relative": relative,
+        "axes": axes,
         "stream": stream,
     }
     try:

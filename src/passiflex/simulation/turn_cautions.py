@@ -108,6 +108,7 @@ def _instants(problem: Problem) -> Iterator[_Instant]:
         stiffness, damping = [before], gains["damping"]
         if changed:
             last = changes[changed - 1]
+            last = last.in_world(pose_at(motion, time - began).rotation, turned=problem.law.task.turned)
             stiffness, damping = [*([] if time >= last.end else stiffness), last.stiffness], last.damping
         blocks = tuple(K[3:, 3:] for K in stiffness)
         yield _Instant(time, pose_at(motion, time - began), blocks, damping[3:, 3:], own[3:])
