@@ -62,8 +62,8 @@ class Table(AbstractReferenceEvent):
 
     at: Instant = Field(default=0.0, description="when t = 0 of the table is, s")
     kind: Literal["table"] = Field(description=KINDS)
-    table: str | None = Field(
-        default=None, description="path of a CSV file; its rows are read at once and kept in `rows`"
+    table: str = Field(
+        default="", description="path of a CSV file; its rows are read at once and kept in `rows`"
     )
     rows: str = Field(description="text of the table, packed if it is long; in place of `table`")
     source: str = Field(default="", description="where the rows came from")
@@ -92,7 +92,7 @@ class Table(AbstractReferenceEvent):
         if not isinstance(written, dict):
             return written
         data = dict(written)
-        name, source = data.pop("table", None), "rows"
+        name, source = data.pop("table", None) or None, "rows"
         rows: Any = data.get("rows")
         if name is None and rows is None:
             raise Mistakes((("table",), "missing: path of a CSV file"))
