@@ -144,7 +144,7 @@ def simulate(problem: Problem, *, rtol: float = 1e-6, atol: float = 1e-8, method
         if (event := starts.get(begin)) is not None:
             loop.F_e = event.F_e
             if event.motion is not None:
-                rates = ("sine", "cosine", "rotation_rate")
+                rates = ("sine", "cosine", "turn")
                 if event.motion["polynomial"][:, 1:].any() or any(np.any(event.motion[k]) for k in rates):
                     raise ValueError("the plain loop knows set-points only")
                 before = loop.potential(x)

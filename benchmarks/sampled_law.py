@@ -59,7 +59,7 @@ def comparable(duration: float) -> Problem:
 def orders(problem: Problem) -> list[Order]:
     """Return what the loop is told, in the order of time."""
     told: list[Order] = []
-    (position, rotation), rates = problem.home, ("sine", "cosine", "rotation_rate")
+    (position, rotation), rates = problem.home, ("sine", "cosine", "turn")
     for event in problem.events:
         if event.motion is not None:
             if event.motion["polynomial"][:, 1:].any() or any(np.any(event.motion[k]) for k in rates):

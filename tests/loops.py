@@ -78,7 +78,6 @@ def tank_numbers(fill: float = 1.0, **other: float) -> np.ndarray:
 
 def random_motion(rng: np.random.Generator) -> dict[str, np.ndarray]:
     """Return coefficients of a reference that moves and turns, whatever the clock."""
-    axis = rng.normal(size=3)
     return {
         "polynomial": rng.uniform(-0.3, 0.3, (3, 6)),
         "horizon": np.asarray(rng.choice([1e-9, 1e9])),
@@ -86,8 +85,7 @@ def random_motion(rng: np.random.Generator) -> dict[str, np.ndarray]:
         "cosine": rng.uniform(-0.2, 0.2, 3),
         "frequency": np.asarray(rng.uniform(1, 6)),
         "rotation": rotation(rng),
-        "rotation_axis": axis / np.linalg.norm(axis),
-        "rotation_rate": np.asarray(rng.uniform(-2, 2)),
+        "turn": rng.uniform(-1, 1, (3, 6)),
     }
 
 

@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from passiflex.simulation import Scenario as Scenario
     from passiflex.simulation import load_scenario as load_scenario
     from passiflex.simulation import salvage as salvage
+    from passiflex.simulation import setpoint_table as setpoint_table
     from passiflex.simulation import simulate as simulate
     from passiflex.studies import shipped_scenario as shipped_scenario
 
@@ -63,6 +64,7 @@ _ROOMS = {
     "run_campaign": "campaigns",
     "salvage": "simulation",
     "shipped_scenario": "studies",
+    "setpoint_table": "simulation",
     "show": "reports",
     "simulate": "simulation",
 }

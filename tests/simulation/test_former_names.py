@@ -44,7 +44,7 @@ def test_what_is_written_has_the_new_names() -> None:
     ("changes", "where"),
     [
         ({"control": {"insist": 1}}, "control.insist: expected true or false; got 1"),
-        ({"gains": [CHANGE | {"duration": -1}]}, "gains[0].duration: expected s, one number, > 0; got -1"),
+        ({"gains": [CHANGE | {"duration": -1}]}, "gains[0].duration: expected s, one number, ≥ 0; got -1"),
         ({"gains": [CHANGE | {"durration": 1}]}, "gains[0].durration: unknown name; try 'duration'"),
         ({"drags": [DRAG | {"viscous": "3 kg"}]}, "drags[0].viscous: expected N s/m, one number, ≥ 0; got '3 kg'"),
         ({"drags": [DRAG | {"dri": 3}]}, "drags[0].dri: unknown name; try 'dry'"),

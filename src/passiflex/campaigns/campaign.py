@@ -12,8 +12,8 @@ from passiflex.campaigns.distributions import Distribution
 from passiflex.campaigns.parameters import checked
 from passiflex.campaigns.target import Target, complete_data, joints_of, locate
 from passiflex.metrics.measures import MEASURES
-from passiflex.scenarios.control_settings import Seconds
 from passiflex.scenarios.scenario import Scenario
+from passiflex.scenarios.spans import Seconds
 from passiflex.texts.model_mistakes import word
 from passiflex.texts.section import Mistakes, Section
 

@@ -1,9 +1,9 @@
 """Reference motions: one primitive with run-time coefficients, so that no motion needs a new build.
 
-    p_d(s) = Σₖ cₖ sᵏ + a sin ωs + b (1 − cos ωs),   R_d(s) = exp([u] ρ s) R₀
+    p_d(s) = Σₖ cₖ sᵏ + a sin ωs + b (1 − cos ωs),   R_d(s) = exp([Σₖ uₖ sᵏ]) R₀
 
-covers a set-point, a ramp, a minimum-jerk move, a circle, a sinusoid and a steady rotation. s is the
-reference's own clock: it runs with the time, and slower when the tank is near its floor.
+covers a set-point, a ramp, a minimum-jerk move with a turn, a piece of a spline, a circle, a sinusoid and a steady
+rotation. s is the reference's own clock: it runs with the time, and slower when the tank is near its floor.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
+from passiflex.control.rotation_vector import angular_velocity, turned
 from passiflex.control.signals import Reference
 from passiflex.layout import Field, Layout
 from passiflex.robots.arm import EndEffectorPose
@@ -32,26 +33,27 @@ class MotionNumbers(Protocol):
     cosine: cs.SX
     frequency: cs.SX
     rotation: cs.SX
-    rotation_axis: cs.SX
-    rotation_rate: cs.SX
+    turn: cs.SX
 
 
 MOTION = Layout(
     (
         Field("polynomial", (3, DEGREE + 1), "m/s^k", "c_k, column k multiplies s^k"),
-        Field("horizon", (), "s", "from here on the polynomial keeps its value"),
+        Field("horizon", (), "s", "from here on both polynomials keep their values"),
         Field("sine", (3,), "m", "a"),
         Field("cosine", (3,), "m", "b"),
         Field("frequency", (), "rad/s", "ω"),
         Field("rotation", (3, 3), "1", "R₀"),
-        Field("rotation_axis", (3,), "1", "u, of unit length"),
-        Field("rotation_rate", (), "rad/s", "ρ"),
+        Field("turn", (3, DEGREE + 1), "rad/s^k", "u_k, in world axes; column k multiplies s^k"),
     ),
     MotionNumbers,
 )
 
 ENDLESS = 1e9
 """Horizon [s] of a motion that never ends."""
+MINIMUM_JERK = (0.0, 0.0, 0.0, 10.0, -15.0, 6.0)
+LINEAR = (0.0, 1.0, 0.0, 0.0, 0.0, 0.0)
+"""Share of a way in powers of the share of its time."""
 
 Motion = Mapping[str, NDArray[np.float64]]
 
@@ -72,11 +74,9 @@ def reference_at(clock: cs.SX, rate: cs.SX, c: MotionNumbers) -> Reference:
     sin, cos = cs.sin(w * clock), cs.cos(w * clock)
     position = c.polynomial @ powers + c.sine * sin + c.cosine * (1 - cos)
     velocity = c.polynomial @ slopes + w * (c.sine * cos + c.cosine * sin)
-    axis = cs.skew(c.rotation_axis)
-    angle = c.rotation_rate * clock
-    turn = cs.SX.eye(3) + cs.sin(angle) * axis + (1 - cs.cos(angle)) * (axis @ axis)
-    twist = cs.vertcat(velocity, c.rotation_rate * c.rotation_axis)
-    return Reference(EndEffectorPose(position, turn @ c.rotation), twist * rate)
+    u = c.turn @ powers
+    twist = cs.vertcat(velocity, angular_velocity(u, c.turn @ slopes))
+    return Reference(EndEffectorPose(position, turned(u) @ c.rotation), twist * rate)
 
 
 def hold(pose: Pose) -> dict[str, NDArray[np.float64]]:
@@ -90,17 +90,29 @@ def hold(pose: Pose) -> dict[str, NDArray[np.float64]]:
         "cosine": np.zeros(3),
         "frequency": np.zeros(()),
         "rotation": np.asarray(pose.rotation, dtype=float),
-        "rotation_axis": np.array([0.0, 0.0, 1.0]),
-        "rotation_rate": np.zeros(()),
+        "turn": np.zeros((3, DEGREE + 1)),
     }
 
 
-def minimum_jerk(pose: Pose, by: ArrayLike, duration: float) -> dict[str, NDArray[np.float64]]:
-    """Return the move by `by` (3,) m within `duration` s, at rest with zero acceleration at both ends."""
+def minimum_jerk(
+    pose: Pose, by: ArrayLike, duration: float, turn: ArrayLike = (0.0, 0.0, 0.0)
+) -> dict[str, NDArray[np.float64]]:
+    """Return the move by `by` (3,) m within `duration` s, at rest with zero acceleration at both ends.
+
+    It turns by the rotation vector `turn` (3,) rad in world axes, about an axis that stays.
+    """
+    return along(pose, by, turn, duration, MINIMUM_JERK)
+
+
+def along(
+    pose: Pose, by: ArrayLike, turn: ArrayLike, duration: float, shape: ArrayLike
+) -> dict[str, NDArray[np.float64]]:
+    """Return the straight line by `by` and the geodesic turn by `turn`, Σ shape_k (s / duration)ᵏ of the way at s."""
     motion = hold(pose)
-    shape = np.array([0, 0, 0, 10, -15, 6]) / duration ** np.arange(DEGREE + 1)
+    way = np.asarray(shape) / duration ** np.arange(DEGREE + 1)
     motion["horizon"] = np.asarray(duration)
-    motion["polynomial"] = motion["polynomial"] + np.asarray(by, dtype=float)[:, None] * shape
+    motion["polynomial"] = motion["polynomial"] + np.asarray(by, dtype=float)[:, None] * way
+    motion["turn"] = motion["turn"] + np.asarray(turn, dtype=float)[:, None] * way
     return motion
 
 
@@ -123,8 +135,11 @@ def pose_at(motion: Motion, clock: float) -> Pose:
         + motion["sine"] * np.sin(w * clock)
         + motion["cosine"] * (1 - np.cos(w * clock))
     )
-    turn = Rotation.from_rotvec(motion["rotation_axis"] * float(motion["rotation_rate"]) * clock)
-    return Pose(position, turn.as_matrix() @ motion["rotation"])
+    turn = motion["turn"] @ powers
+    return Pose(
+        position,
+        Rotation.from_rotvec(turn).as_matrix() @ motion["rotation"] if turn.any() else motion["rotation"],
+    )
 
 
 def shifted(motion: Motion, start: Pose) -> dict[str, NDArray[np.float64]]:
@@ -132,7 +147,10 @@ def shifted(motion: Motion, start: Pose) -> dict[str, NDArray[np.float64]]:
     begin = pose_at(motion, 0.0)
     moved = {k: np.array(v) for k, v in motion.items()}
     moved["polynomial"][:, 0] += start.position - begin.position
-    moved["rotation"] = start.rotation
+    first = moved["turn"][:, 0]
+    moved["rotation"] = (
+        Rotation.from_rotvec(-first).as_matrix() @ start.rotation if first.any() else start.rotation
+    )
     return moved
 
 

@@ -9,7 +9,10 @@ from typing import Any
 from passiflex.errors import ValueRangeError
 from passiflex.problems.altered import HIGHEST_RATE, altered, at_rate
 from passiflex.problems.problem import SampledProblem, require_sampled
+from passiflex.scenarios.events import turning
+from passiflex.scenarios.path import ViaPath
 from passiflex.scenarios.scenario_file import as_scenario
+from passiflex.scenarios.setpoints import Table
 from passiflex.simulation import Problem, Scenario, parse_scenario, resolve
 from passiflex.texts.quantity import Quantity, shown
 
@@ -73,8 +76,12 @@ def with_task(scenario: Scenario, task: str) -> Scenario:
                     changes[f"{place}.{name}.rotation"] = None
                 if gains is not None and gains.matrix is not None:
                     changes[f"{place}.{name}.matrix"] = [row[:3] for row in gains.matrix[:3]]
-        turning = (i for i, event in enumerate(scenario.reference) if hasattr(event, "turn"))
-        changes |= {f"reference[{i}].turn": None for i in turning}
+        several = [event for event in scenario.reference if isinstance(event, ViaPath | Table)]
+        if any(turning(event) for event in several):  # on what the reference does no limit depends
+            changes["reference"] = None
+        else:
+            for i, event in enumerate(scenario.reference):
+                changes |= {f"reference[{i}].{place[0]}": None for place in turning(event)}
     return scenario.changed(changes)
 
 

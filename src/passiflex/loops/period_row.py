@@ -8,7 +8,11 @@ from functools import cached_property
 import casadi as cs
 
 from passiflex.control.motion import MOTION, reference_at
+from passiflex.control.tool_axes import in_world
 from passiflex.layout import Field, Layout
+
+SHORTEST = 1e-9
+"""Two instants closer than this are one [s]: gains that go over meanwhile are there at once."""
 
 
 @dataclass(frozen=True)
@@ -21,6 +25,8 @@ class PeriodRow:
     n: int
     k: int
     environment: Layout
+    turned: bool = False
+    """As `AbstractTask.turned`."""
 
     @cached_property
     def layout(self) -> Layout:
@@ -55,8 +61,11 @@ class PeriodRow:
             Field("new_stiffness", (k, k), "N/m, N, N m/rad", "and after it"),
             Field("old_damping", (k, k), "N s/m, N s, N m s/rad", "D_x before the change of gains"),
             Field("new_damping", (k, k), "N s/m, N s, N m s/rad", "and after it"),
+            Field("old_in_tool", (2,), "1", "1 for those that are in the axes of the reference: K_x, D_x"),
+            Field("new_in_tool", (2,), "1", "and after it"),
             Field("change_from", (), "s", "when the change of gains begins"),
             Field("change_to", (), "s", "when it has ended"),
+            Field("change_linear", (), "1", "1 if it goes linearly, 0 with minimum jerk"),
             Field("feedforward", (6,), "N, N m", "wrench that the end effector is to exert"),
         )
         return self.environment + MOTION + Layout(own)
@@ -68,7 +77,7 @@ class PeriodRow:
 
     @cached_property
     def function(self) -> cs.Function:
-        """Return (time, schedule, drawn) → row. Gains go over to others with minimum jerk."""
+        """Return (time, schedule, drawn) → row. Gains go over to others with minimum jerk, linearly, or at once."""
         time = cs.SX.sym("time")
         schedule, c = self.schedule.symbols("schedule")
         drawn, chance = self.drawn.symbols("drawn")
@@ -79,15 +88,23 @@ class PeriodRow:
             "known", [clock, schedule], [*motion.pose, motion.velocity, acceleration], {"cse": True}
         )
         position, rotation, velocity, acceleration = known(cs.fmax(time - c.began, 0), schedule)
-        s = cs.fmin(cs.fmax((time - c.change_from) / (c.change_to - c.change_from), 0), 1)
-        blend = s**3 * (10 - 15 * s + 6 * s**2)
+        lasts = c.change_to - c.change_from
+        s = cs.fmin(cs.fmax((time - c.change_from) / cs.fmax(lasts, SHORTEST), 0), 1)
+        s = cs.if_else(lasts > SHORTEST, s, 1)
+        blend = cs.if_else(c.change_linear > 0, s, s**3 * (10 - 15 * s + 6 * s**2))
+
+        def told(old: cs.SX, new: cs.SX, i: int) -> cs.SX:
+            whole = i == 1 and not self.turned
+            old = in_world(old, rotation, c.old_in_tool[i], whole=whole)
+            return _between(old, in_world(new, rotation, c.new_in_tool[i], whole=whole), blend)
+
         values = {f.name: getattr(c, f.name) for f in self.environment} | {
             "desired_position": position,
             "desired_rotation": rotation,
             "desired_velocity": velocity,
             "desired_acceleration": acceleration,
-            "desired_stiffness": _between(c.old_stiffness, c.new_stiffness, blend),
-            "desired_damping": _between(c.old_damping, c.new_damping, blend),
+            "desired_stiffness": told(c.old_stiffness, c.new_stiffness, 0),
+            "desired_damping": told(c.old_damping, c.new_damping, 1),
             "feedforward": c.feedforward,
             "torque_noise": chance.torque_noise,
             "elapsed": chance.elapsed,

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from passiflex.control.motion import rebased
 from passiflex.control.posture import posture
 from passiflex.errors import NameUnknownError, ValueRangeError
-from passiflex.problems.problem import Problem, SampledProblem, require_sampled
+from passiflex.problems.problem import FROM_THE_START, Problem, SampledProblem, require_sampled
 from passiflex.scenarios.control_settings import MOST_PERIODS
 from passiflex.scenarios.scenario import Scenario
 from passiflex.scenarios.scenario_file import parse_scenario
@@ -87,6 +87,9 @@ def altered(
         period=period,
         delay=late,
     )
+    if {"stiffness", "damping"} & new.keys():  # in world axes, in place of what the law has in tool axes
+        later = tuple(c for c in s.gain_changes if c.start > FROM_THE_START)
+        changed = dataclasses.replace(changed, gain_changes=later)
     for part, values in (("gains", own), ("fallback", fallback), ("plant", true)):
         changed = changed.with_numbers(values, part)
     for part in ("inner", "errors"):

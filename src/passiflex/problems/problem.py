@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from passiflex.control.law import AbstractLaw
 from passiflex.control.motion import Motion, Pose
+from passiflex.control.tool_axes import damping_in_world, stiffness_in_world
 from passiflex.errors import ValueRangeError
 from passiflex.loops.closed_loop import ClosedLoop
 from passiflex.loops.plant import Elements
@@ -24,6 +25,10 @@ from passiflex.sampled.sensors import AbstractSensorEffect
 
 Array = NDArray[np.float64]
 NOTHING: Mapping[str, ArrayLike] = MappingProxyType({})
+FROM_THE_START = -1.0
+"""Instant [s] of the change to gains that the law has in tool axes: they are in force from the first period on."""
+MOST_JUDGED = 40
+"""Gains that a scenario goes over to, of which each is judged."""
 
 
 class Event(NamedTuple):
@@ -60,12 +65,27 @@ class TankStart(NamedTuple):
 
 
 class GainChange(NamedTuple):
-    """From `start` to `end` [s], K_x and D_x go over to these values (k, k) with minimum jerk."""
+    """From `start` to `end` [s], K_x and D_x go over to these values (k, k): with minimum jerk, or linearly.
+
+    Where the two instants are one, they are there at once.
+    """
 
     start: float
     end: float
     stiffness: Array
     damping: Array
+    linear: bool = False
+    in_tool: tuple[bool, bool] = (False, False)
+    """Whether stiffness and damping are in the axes of the reference throughout, and turn with it."""
+
+    def in_world(self, rotation: Array, *, turned: bool) -> GainChange:
+        """Return the same in world axes for a reference of this orientation; `turned` as `AbstractTask.turned`."""
+        K, D = self.stiffness, self.damping
+        return self._replace(
+            stiffness=stiffness_in_world(K, rotation) if self.in_tool[0] else K,
+            damping=damping_in_world(D, rotation, turned=turned) if self.in_tool[1] else D,
+            in_tool=(False, False),
+        )
 
 
 class Lasting(NamedTuple):
@@ -164,6 +184,25 @@ class SampledProblem(Problem):
     def loop(self) -> SampledLoop:
         """Return the loop that runs."""
         return SampledLoop(self.controller, self.elements, self.effects)
+
+    @cached_property
+    def told_gains(self) -> tuple[GainChange, ...]:
+        """Return those of the changes of gains that a judge looks at: each once, and of very many the extremes.
+
+        They are as they would be at the start, in world axes.
+
+        Those are the ones with the least and the largest of each number on the diagonals, and some in between.
+        """
+        turned = self.law.task.turned
+        told = (c.in_world(self.home.rotation, turned=turned) for c in self.gain_changes)
+        different = {(c.stiffness.tobytes(), c.damping.tobytes()): c for c in told}
+        changes = tuple(different.values())
+        if len(changes) <= MOST_JUDGED:
+            return changes
+        numbers = np.array([np.concatenate([np.diag(c.stiffness), np.diag(c.damping)]) for c in changes])
+        between = np.linspace(0, len(changes) - 1, MOST_JUDGED - 2 * numbers.shape[1]).astype(int)
+        which = {*numbers.argmin(axis=0).tolist(), *numbers.argmax(axis=0).tolist(), *between.tolist()}
+        return tuple(changes[i] for i in sorted(which))
 
     @cached_property
     def parts(self) -> Parts:

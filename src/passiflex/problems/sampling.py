@@ -17,7 +17,7 @@ from passiflex.elements.end_stops import NO_END
 from passiflex.errors import SizeError
 from passiflex.loops.plant import Elements
 from passiflex.loops.sampled_loop import SampledLoop
-from passiflex.problems.problem import GainChange, Lasting
+from passiflex.problems.problem import FROM_THE_START, GainChange, Lasting
 from passiflex.robots.flexible import FlexibleJointRobot
 from passiflex.sampled.controller import SampledController
 from passiflex.sampled.measurement_bound import BEND
@@ -28,6 +28,7 @@ from passiflex.scenarios.environment import labelled
 from passiflex.scenarios.held_settings import Load
 from passiflex.scenarios.noise_settings import Noise
 from passiflex.scenarios.scenario import Scenario
+from passiflex.scenarios.setpoints import Table
 from passiflex.scenarios.tank_settings import TankSettings
 from passiflex.scenarios.touching import Site
 
@@ -282,10 +283,31 @@ def _limits(motors: MotorSettings, robot: FlexibleJointRobot) -> dict[str, Array
 
 
 def _gain_changes(scenario: Scenario, gains: dict[str, Array]) -> tuple[GainChange, ...]:
+    law, changes = scenario.law, list[GainChange]()
     stiffness, damping = gains["stiffness"], gains["damping"]
-    changes = []
+    K_in, D_in = law.stiffness.in_tool, law.damping.in_tool
+    if K_in or D_in:
+        stiffness = law.stiffness.full() if K_in else stiffness
+        damping = law.damping.full() if D_in else damping
+        changes.append(GainChange(FROM_THE_START, FROM_THE_START, stiffness, damping, in_tool=(K_in, D_in)))
+    begins = [*(event.at for event in scenario.reference[1:]), scenario.duration]
+    for event, end in zip(scenario.reference, begins, strict=False):
+        if not isinstance(event, Table):
+            continue
+        for row in event.gains(scenario.seed):
+            if row.start >= end:
+                break
+            if row.stiffness is not None:
+                stiffness, K_in = row.stiffness, event.in_tool
+            if row.damping is not None:
+                damping, D_in = row.damping, event.in_tool
+            linear = event.between == "linear"
+            changes.append(GainChange(row.start, row.end, stiffness, damping, linear, (K_in, D_in)))
     for change in scenario.gain_changes:
-        stiffness = stiffness if change.stiffness is None else change.stiffness.full()
-        damping = damping if change.damping is None else change.damping.full()
-        changes.append(GainChange(change.at, change.at + change.duration, stiffness, damping))
+        if change.stiffness is not None:
+            stiffness, K_in = change.stiffness.full(), change.stiffness.in_tool
+        if change.damping is not None:
+            damping, D_in = change.damping.full(), change.damping.in_tool
+        end = change.at + change.duration
+        changes.append(GainChange(change.at, end, stiffness, damping, in_tool=(K_in, D_in)))
     return tuple(changes)

@@ -48,10 +48,13 @@ def _felt(entries: Sequence[Sequence[Change]], time: float) -> dict[str, Any]:
 def _motions(scenario: Scenario, home: Pose) -> dict[float, Motion]:
     motions: dict[float, Motion] = {0.0: hold(home)}
     began = 0.0
-    for event in scenario.reference:
+    ends = [*(event.at for event in scenario.reference[1:]), scenario.duration]
+    for event, end in zip(scenario.reference, ends, strict=False):
         now = pose_at(motions[began], event.at - began)
-        motions[event.at] = event.build(now)
-        began = event.at
+        for time, motion in event.motions(now, scenario.seed):
+            if time >= end:
+                break
+            motions[time], began = motion, time
     return motions
 
 

@@ -15,7 +15,7 @@ from passiflex.scenarios.gain_settings import (
     Stiffness,
     free_mistakes,
 )
-from passiflex.scenarios.spans import Instant, Seconds, TimeSpan
+from passiflex.scenarios.spans import Instant, TimeSpan
 from passiflex.texts.quantity import Quantity, shown
 from passiflex.texts.section import Mistakes, Section
 
@@ -244,10 +244,10 @@ class Feedforward(TimeSpan):
 
 
 class GainChange(Section):
-    """K_x and D_x go over to other values, smoothly (minimum jerk) and without a bump."""
+    """K_x and D_x go over to other values: smoothly (minimum jerk) and without a bump, or at once."""
 
     at: Instant = Field(description="when it begins, s")
-    duration: Seconds = Field(description="how long it takes, s")
+    duration: Instant = Field(description="how long it takes, s; 0: at once")
     stiffness: Stiffness | None = Field(default=None, description="K_x at the end; stays if left out")
     damping: Damping | None = Field(default=None, description="D_x at the end; stays if left out")
 
@@ -256,7 +256,12 @@ def change_mistakes(changes: Sequence[GainChange], task: str, free: tuple[int, .
     """Return what of the changes overlaps, or does not fit the task."""
     found: Found = []
     for i, change in enumerate(changes):
-        if i and not change.at >= changes[i - 1].at + changes[i - 1].duration - NOW:
+        before = changes[i - 1]
+        if i and change.at <= before.at + NOW and not before.duration:
+            found.append(
+                ((i, "at"), f"needs to be later than the one before, {before.at:g} s; got {change.at:g} s")
+            )
+        elif i and not change.at >= before.at + before.duration - NOW:
             found.append(((i, "at"), f"the change before lasts longer; got {change.at:g} s"))
         found += [((i, *place), text) for place, text in gain_mistakes(change, task, free)]
     return found
@@ -271,6 +276,10 @@ def gain_mistakes(given: Fallback | GainChange, task: str, free: tuple[int, ...]
         try:
             if part is None:
                 continue
+            if part.in_tool and isinstance(given, Fallback):
+                raise Mistakes(
+                    (("axes",), "the fallback holds one pose; give its gains in axes of the world")
+                )
             part.require(task)
         except Mistakes as mistakes:
             found += [((name, *place), text) for place, text in mistakes.entries]

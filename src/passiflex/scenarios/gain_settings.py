@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, ClassVar, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -175,7 +175,32 @@ class AbstractGains(Section):
         return np.block([[np.array(self.translation), zero], [zero, np.array(self.rotation)]])
 
 
-class Stiffness(AbstractGains):
+class AbstractInAxes(AbstractGains):
+    """Gains in axes of the world or of a tool."""
+
+    axes: Literal["world", "tool"] = Field(
+        default="world",
+        description="world: those said here; tool: all in the axes of the reference, that turn with it, with control "
+        "only",
+    )
+
+    @property
+    def in_tool(self) -> bool:
+        """Return whether they are in the axes of the reference throughout."""
+        return self.axes == "tool"
+
+    @model_validator(mode="after")
+    def _no_free_place(self) -> Self:
+        if self.in_tool and self.alternative is not None and getattr(self, self.alternative) is not None:
+            raise Mistakes((("axes",), f"a {self.alternative} has no axes; remove it, or give the numbers"))
+        if self.in_tool and any(i < 3 for i in self.free):
+            raise Mistakes(
+                (("axes",), "a free translation is one of the world; remove it, or hold all three")
+            )
+        return self
+
+
+class Stiffness(AbstractInAxes):
     """K_x."""
 
     translation: Annotated[Matrix, _three("N/m", least=0), *_BLOCK] | None = Field(
@@ -187,7 +212,7 @@ class Stiffness(AbstractGains):
     )
 
 
-class Damping(AbstractGains):
+class Damping(AbstractInAxes):
     """D_x."""
 
     alternative: ClassVar[str | None] = "ratio"

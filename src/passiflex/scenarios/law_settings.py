@@ -98,12 +98,22 @@ class AbstractLawSettings(Section, abc.ABC):
             For numbers that do not fit the robot's joints.
         """
 
-    def _common(self) -> Numbers:
+    def _common(self, start: Posture) -> Numbers:
+        from passiflex.control.tool_axes import stiffness_in_world
+
+        K = self.stiffness.full()
         return {
-            "stiffness": self.stiffness.full(),
+            "stiffness": stiffness_in_world(K, start.pose.rotation) if self.stiffness.in_tool else K,
             "null_space_damping": np.asarray(self.null_space_damping),
             "regularisation": np.asarray(self.regularisation, dtype=np.float64),
         }
+
+    def _damping(self, law: AbstractLaw, start: Posture) -> NDArray[np.float64]:
+        """Return D_x in world axes, if it is not given by its ratio."""
+        from passiflex.control.tool_axes import damping_in_world
+
+        D = self.damping.full()
+        return damping_in_world(D, start.pose.rotation, turned=law.task.turned) if self.damping.in_tool else D
 
     def _task(self) -> AbstractTask:
         from passiflex.control.task import PoseTask, PositionTask
@@ -139,7 +149,7 @@ class ImpedanceSettings(AbstractLawSettings):
         """Return the numbers of the law; a damping ratio is designed for the start."""
         from passiflex.control.gain_design import designed_damping
 
-        own, robot = self._common(), law.robot.name
+        own, robot = self._common(start), law.robot.name
         own["shaped_stiffness"] = self.shaped_stiffness.resolve(
             model["joint_stiffness"], "law.shaped_stiffness", robot
         )
@@ -148,7 +158,9 @@ class ImpedanceSettings(AbstractLawSettings):
         )
         ratio = self.damping.ratio
         damping = (
-            self.damping.full() if ratio is None else designed_damping(law.task, own, start, model, ratio)
+            self._damping(law, start)
+            if ratio is None
+            else designed_damping(law.task, own, start, model, ratio)
         )
         return own | {"damping": damping}
 
@@ -191,14 +203,14 @@ class RigidSettings(AbstractLawSettings):
         from passiflex.control.damping_design import damping_from_ratio
         from passiflex.control.gain_design import in_world, target_inertia
 
-        own, target = self._common(), self.target_inertia
+        own, target = self._common(start), self.target_inertia
         world = in_world(own["stiffness"], start.pose.rotation)
         if target.damping_ratio is not None:
-            inertia = target_inertia(world, self.damping.full(), target.damping_ratio)
+            inertia = target_inertia(world, self._damping(law, start), target.damping_ratio)
         else:
             inertia = target.full()
         ratio = self.damping.ratio
-        damping = self.damping.full() if ratio is None else damping_from_ratio(world, inertia, ratio)
+        damping = self._damping(law, start) if ratio is None else damping_from_ratio(world, inertia, ratio)
         carried = model["motor_inertia"] if self.motor_inertia == "carried" else np.zeros(law.robot.n)
         return own | {"target_inertia": inertia, "damping": damping, "carried_inertia": carried}
 

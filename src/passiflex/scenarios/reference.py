@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import abc
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import BeforeValidator, Field
+from pydantic import BeforeValidator, Field, model_validator
 
 from passiflex.scenarios.spans import Instant, Seconds
 from passiflex.texts.quantity import Quantity, shown
-from passiflex.texts.section import Section
+from passiflex.texts.section import Mistakes, Section
 
 if TYPE_CHECKING:  # who reads a scenario needs no CasADi
     from passiflex.control.motion import Motion, Pose
@@ -19,7 +20,7 @@ Vector = tuple[float, ...]
 Length = Annotated[Vector, Quantity("m", ((3,),))]
 Turn = Annotated[Vector, Quantity("rad", ((3,),))]
 ZERO = (0.0, 0.0, 0.0)
-KINDS = "step, move, circle or hold"
+KINDS = "step, move, circle, hold, path or table"
 
 
 class AbstractReferenceEvent(Section, abc.ABC):
@@ -34,6 +35,13 @@ class AbstractReferenceEvent(Section, abc.ABC):
     def build(self, now: Pose) -> Motion:
         """Return the motion that begins where the reference is now."""
 
+    def motions(self, now: Pose, seed: int = 0) -> Sequence[tuple[float, Motion]]:
+        """Return its motions with their beginnings [s], in the order of time; most events are one.
+
+        Whatever of it is left to chance is drawn by `seed`, that of the scenario.
+        """
+        return [(self.at, self.build(now))]
+
     @abc.abstractmethod
     def words(self) -> str:
         """Return what it is, in a few words."""
@@ -41,6 +49,13 @@ class AbstractReferenceEvent(Section, abc.ABC):
     def in_full(self) -> str:
         """Return the same with all its numbers; nothing where there is no more to say."""
         return ""
+
+
+def how_far(by: Vector, turn: Vector) -> str:
+    """Return the length of a displacement and the angle of a turn, where they are not 0."""
+    parts = [f"{np.linalg.norm(by):g} m"] if any(by) else []
+    parts += [f"{np.linalg.norm(turn):.3g} rad"] if any(turn) else []
+    return ", ".join(parts)
 
 
 class Step(AbstractReferenceEvent):
@@ -58,9 +73,7 @@ class Step(AbstractReferenceEvent):
 
     def words(self) -> str:
         """Return how far it jumps."""
-        parts = [f"{np.linalg.norm(self.by):g} m"] if any(self.by) else []
-        parts += [f"{np.linalg.norm(self.turn):.3g} rad"] if any(self.turn) else []
-        return f"step {', '.join(parts)}".strip()
+        return f"step {how_far(self.by, self.turn)}".strip()
 
     def in_full(self) -> str:
         """Return where it jumps, and when."""
@@ -71,18 +84,27 @@ class Move(AbstractReferenceEvent):
     """The reference moves with minimum jerk."""
 
     kind: Literal["move"] = Field(description=KINDS)
-    by: Length = Field(description="displacement in world axes, m")
+    by: Length = Field(default=ZERO, description="displacement in world axes, m")
+    turn: Turn = Field(
+        default=ZERO, description="rotation vector of the turn in world axes, rad, about an axis that stays"
+    )
     duration: Seconds = Field(description="how long the move takes, s")
+
+    @model_validator(mode="after")
+    def _somewhere(self) -> Self:
+        if not any(self.by) and not any(self.turn):
+            raise Mistakes((("by",), "missing; a move needs by, turn or both"))
+        return self
 
     def build(self, now: Pose) -> Motion:
         """Return the move."""
         from passiflex.control.motion import minimum_jerk
 
-        return minimum_jerk(now, self.by, self.duration)
+        return minimum_jerk(now, self.by, self.duration, self.turn)
 
     def words(self) -> str:
         """Return how far it goes."""
-        return f"move {np.linalg.norm(self.by):g} m"
+        return f"move {how_far(self.by, self.turn)}"
 
 
 def _axes(written: Any) -> tuple[str, str]:
@@ -102,13 +124,20 @@ class Circle(AbstractReferenceEvent):
     )
     radius: Annotated[float, Quantity("m", above=0)] = Field(description="radius, m")
     period: Seconds = Field(description="time of one turn, s")
+    turns: Annotated[float, Quantity("1")] = Field(
+        default=0.0,
+        description="how often the end effector turns about the circle's normal meanwhile; 1: it turns along with "
+        "the circle",
+    )
 
     def build(self, now: Pose) -> Motion:
         """Return the circle."""
         from passiflex.control.motion import circle
 
         first, second = (np.eye(3)["xyz".index(a)] for a in self.plane)
-        return circle(now, first, second, self.radius, self.period)
+        motion = circle(now, first, second, self.radius, self.period)
+        motion["turn"][:, 1] = self.turns * 2 * np.pi / self.period * np.cross(first, second)
+        return motion
 
     def words(self) -> str:
         """Return that it is one."""
@@ -134,6 +163,3 @@ class Hold(AbstractReferenceEvent):
     def words(self) -> str:
         """Return that it holds."""
         return "hold"
-
-
-ReferenceEvent = Annotated[Step | Move | Circle | Hold, Field(discriminator="kind")]

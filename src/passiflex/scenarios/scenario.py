@@ -19,12 +19,14 @@ from passiflex.scenarios.control_settings import (
     gain_mistakes,
 )
 from passiflex.scenarios.environment import Touching, as_drags, labelled
+from passiflex.scenarios.events import ReferenceEvent, event_mistakes
 from passiflex.scenarios.law_settings import LawSettings
 from passiflex.scenarios.model_errors import Deviations, ModelErrors
 from passiflex.scenarios.noise_settings import Noise
 from passiflex.scenarios.posture import StartPosture
-from passiflex.scenarios.reference import ZERO, ReferenceEvent
+from passiflex.scenarios.reference import ZERO
 from passiflex.scenarios.row_interval import fitting_interval, interval_mistake
+from passiflex.scenarios.setpoints import Table, as_events
 from passiflex.scenarios.spans import Seconds, TimeSpan
 from passiflex.scenarios.tank_settings import TankSettings
 from passiflex.scenarios.touching import Hand
@@ -82,7 +84,7 @@ class Scenario(Section):
     )
     duration: Seconds = Field(description="simulated time, s")
     reference: tuple[ReferenceEvent, ...] = Field(
-        default=(), description="what the reference does, in the order of time"
+        default=(), description="what the reference does, in the order of time; or `{table: FILE.csv}`"
     )
     forces: tuple[Force, ...] = Field(default=(), description="external forces on the end effector")
     deviations: Deviations = Field(
@@ -175,6 +177,18 @@ class Scenario(Section):
         return control
 
     @model_validator(mode="after")
+    def _tool_axes_only_sampled(self) -> Self:
+        found = [name for name in ("stiffness", "damping") if getattr(self.law, name).in_tool]
+        if self.control is None and found:
+            raise Mistakes(
+                *(
+                    (("law", name, "axes"), "tool needs `control`, in which each turn of them is paid for")
+                    for name in found
+                )
+            )
+        return self
+
+    @model_validator(mode="after")
     def _tank_with_a_use(self) -> Self:
         gating = self.control is None or self.actions or self.feedforward
         try:
@@ -205,6 +219,8 @@ class Scenario(Section):
     ) -> tuple[GainChange, ...]:
         law = info.data.get("law")
         found = change_mistakes(changes, law.task, law.stiffness.free) if law else []
+        if changes and any(isinstance(e, Table) and e.changes_gains for e in info.data.get("reference", ())):
+            raise ValueError("a table of the reference has gains too; keep one of the two")
         if found:
             raise Mistakes(*found)
         return changes
@@ -217,23 +233,18 @@ class Scenario(Section):
             return noise.fitted(control.rate)
         return noise
 
+    @field_validator("reference", mode="before")
+    @classmethod
+    def _table_alone(cls, written: Any) -> Any:
+        return as_events(written)
+
     @field_validator("reference")
     @classmethod
     def _in_order(cls, events: tuple[Any, ...], info: ValidationInfo) -> tuple[Any, ...]:
-        found: list[tuple[tuple[str | int, ...], str]] = []
-        end = info.data.get("duration", float("inf"))
-        positions = "law" in info.data and info.data["law"].task == "position"
-        for i, event in enumerate(events):
-            got = f"got {event.at:g} s"
-            if i and not event.at > events[i - 1].at:
-                found.append(
-                    ((i, "at"), f"needs to be later than the one before, {events[i - 1].at:g} s; {got}")
-                )
-            if not event.at < end:
-                found.append(((i, "at"), f"needs to be earlier than the end, {end:g} s; {got}"))
-            if positions and getattr(event, "turn", ZERO) != ZERO:
-                found.append(((i, "turn"), "a position task has no orientation; remove it"))
-        if found:
+        law, end = info.data.get("law"), info.data.get("duration", float("inf"))
+        if found := event_mistakes(
+            events, law, end, sampled=info.data.get("control", "in error") is not None
+        ):
             raise Mistakes(*found)
         return events
 

@@ -123,6 +123,15 @@ def read_tree(text: str, kind: str, needs: str, source: str) -> tuple[dict[str, 
     return data, tree
 
 
+def _found(reference: Any, folder: Path) -> Any:
+    """Return a reference whose tables are named by paths that are found from anywhere."""
+    if isinstance(reference, list):
+        return [_found(event, folder) for event in reference]
+    if isinstance(reference, dict) and isinstance(name := reference.get("table"), str) and name.strip():
+        return reference | {"table": str(folder / name)}
+    return reference
+
+
 def read_scenario(
     data: dict[str, Any], tree: Tree, place: Place, base_dir: str | Path | None
 ) -> Scenario | None:
@@ -130,6 +139,8 @@ def read_scenario(
     robot = data.get("robot")
     if base_dir is not None and isinstance(robot, str) and is_path(robot):
         data["robot"] = str(Path(base_dir) / robot)
+    if base_dir is not None:
+        data |= {"reference": _found(data["reference"], Path(base_dir))} if "reference" in data else {}
     try:
         return Scenario.model_validate(data)
     except ValidationError as error:

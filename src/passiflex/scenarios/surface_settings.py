@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
-from scipy.spatial.transform import Rotation
 
-from passiflex.scenarios.reference import ZERO, Length, ReferenceEvent, Turn, Vector
+from passiflex.scenarios.reference import ZERO, Circle, Hold, Length, Move, Step, Turn, Vector
 from passiflex.scenarios.touching import KINDS, AbstractTouching, Change, Site
 from passiflex.texts.quantity import Quantity
 from passiflex.texts.section import Mistakes
@@ -19,6 +18,8 @@ from passiflex.texts.section import Mistakes
 if TYPE_CHECKING:  # who reads a scenario needs no CasADi
     from passiflex.elements import AbstractElement, AbstractShape
 
+Moved = Annotated[Step | Move | Circle | Hold, Field(discriminator="kind")]
+"""How a surface moves."""
 Size = Annotated[float, Quantity("m", above=0)]
 BRISTLE = 1e4
 """Stiffness [N/m] against which a hand sticks to a surface that is not softer, unless another is given."""
@@ -56,7 +57,7 @@ class AbstractSurface(AbstractTouching):
         strict=True,
         description="its place counts from where the end effector starts, along the world's axes",
     )
-    motion: tuple[ReferenceEvent, ...] = Field(
+    motion: tuple[Moved, ...] = Field(
         default=(), description="how it moves, as a reference does; turns are not among it"
     )
 
@@ -73,8 +74,9 @@ class AbstractSurface(AbstractTouching):
             if not event.at > self.motion[i - 1].at:
                 raise Mistakes((("motion", i, "at"), f"later than the one before; got {event.at:g} s"))
         for i, event in enumerate(self.motion):
-            if any(getattr(event, "turn", ZERO)):
-                raise Mistakes((("motion", i, "turn"), "a surface moves, and does not turn"))
+            turned = [name for name in ("turn", "turns") if np.any(getattr(event, name, 0.0))]
+            if turned:
+                raise Mistakes((("motion", i, turned[0]), "a surface moves, and does not turn"))
         return self
 
     @property
@@ -138,6 +140,8 @@ class AbstractSurface(AbstractTouching):
 
 def _towards(z: Vector) -> NDArray[np.float64]:
     """Return axes at right angles with their z along a direction."""
+    from scipy.spatial.transform import Rotation
+
     return Rotation.align_vectors([z], [(0, 0, 1)])[0].as_matrix()
 
 
@@ -245,6 +249,8 @@ class Box(_Body):
     @property
     def axes(self) -> NDArray[np.float64]:
         """Return the directions of its edges."""
+        from scipy.spatial.transform import Rotation
+
         return np.asarray(Rotation.from_rotvec(self.rotation_vector).as_matrix())
 
     def shape(self) -> AbstractShape:

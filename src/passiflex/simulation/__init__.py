@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from passiflex.scenarios.scenario import Scenario as Scenario
     from passiflex.scenarios.scenario_file import load_scenario as load_scenario
     from passiflex.scenarios.scenario_file import parse_scenario as parse_scenario
+    from passiflex.simulation.setpoint_arrays import setpoint_table as setpoint_table
     from passiflex.simulation.simulated import simulate as simulate
     from passiflex.simulation.through_time import simulate_problem as simulate_problem
 
@@ -35,6 +36,7 @@ _HOMES = {
     "passed_limits": ".runs.passed_limit",
     "resolve": ".problems.resolution",
     "salvage": ".runs.salvaged",
+    "setpoint_table": "setpoint_arrays",
     "simulate": "simulated",
     "simulate_problem": "through_time",
 }

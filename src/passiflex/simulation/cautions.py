@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 from passiflex.problems.problem import Problem
 from passiflex.simulation.book_cautions import book_cautions
+from passiflex.simulation.jump_cautions import far_jumps
 from passiflex.simulation.stability_cautions import stability_cautions
 from passiflex.simulation.start_cautions import singular_start
 from passiflex.simulation.turn_cautions import far_turns, large_moments
@@ -13,6 +14,7 @@ from passiflex.simulation.turn_cautions import far_turns, large_moments
 CAUTIONS: tuple[Callable[[Problem], tuple[str, ...]], ...] = (
     stability_cautions,
     singular_start,
+    far_jumps,
     far_turns,
     large_moments,
     book_cautions,

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from passiflex.control.motion import Motion
 from passiflex.loops.period_row import PeriodRow
 from passiflex.native import NativeFunction
-from passiflex.problems.problem import Event, SampledProblem
+from passiflex.problems.problem import GainChange, SampledProblem
 
 Array = NDArray[np.float64]
 
@@ -28,12 +28,12 @@ class Scheduled(NamedTuple):
 
 def schedule(problem: SampledProblem, row: PeriodRow) -> list[Scheduled]:
     """Return what is told to the loop, in the order of time; each takes effect at the first sample at or after it."""
-    period = problem.period
+    period, walk = problem.period, _Walk(problem, row)
     times = {e.time for e in problem.events} | {c.start for c in problem.gain_changes}
     times |= {t for i in problem.feedforward for t in (i.start, i.end)}
     firsts = sorted({_first_period(t, period) for t in times})
     within = (k for k in firsts if k * period <= problem.duration + NOW)
-    return [Scheduled(k, _in_force(problem, row, k * period)) for k in within]
+    return [Scheduled(k, walk.until(k * period)) for k in within]
 
 
 class Chance:
@@ -118,29 +118,45 @@ def _first_period(time: float, period: float) -> int:
     return k
 
 
-def _in_force(problem: SampledProblem, row: PeriodRow, time: float) -> Array:
-    gains = problem.law.layout.unpack(problem.gains)
-    so_far = tuple(e for e in problem.events if e.time <= time + NOW)
-    motion, began = _motion(so_far)
-    changes = [c for c in problem.gain_changes if c.start <= time + NOW]
-    old = changes[-2] if len(changes) > 1 else None
-    new = changes[-1] if changes else None
-    pushing = (i.numbers for i in problem.feedforward if i.start <= time + NOW < i.end)
-    values: dict[str, Any] = {
-        **row.environment.zeros(),
-        **so_far[-1].environment,
-        **motion,
-        "began": began,
-        "feedforward": sum(pushing, np.zeros(6)),
-        "change_from": new.start if new else -1.0,
-        "change_to": new.end if new else 0.0,
-    }
-    for name in ("stiffness", "damping"):
-        values[f"old_{name}"] = getattr(old, name) if old else gains[name]
-        values[f"new_{name}"] = getattr(new, name) if new else gains[name]
-    return row.schedule.pack({f.name: values[f.name] for f in row.schedule})
+class _Walk:
+    """What is in force, from instant to instant in the order of time: each event is looked at once."""
 
+    def __init__(self, problem: SampledProblem, row: PeriodRow):
+        self.problem, self.row = problem, row
+        self.event = self.change = 0  # how many have begun
+        self.motion: Motion | None = None
+        self.began = 0.0
+        gains = problem.law.layout.unpack(problem.gains)
+        self.own = GainChange(-1.0, 0.0, gains["stiffness"], gains["damping"])
 
-def _motion(events: tuple[Event, ...]) -> tuple[Motion, float]:
-    """Return the motion in force after these events, and when it began."""
-    return next((e.motion, e.time) for e in reversed(events) if e.motion is not None)
+    def until(self, time: float) -> Array:
+        """Return the numbers of `PeriodRow.schedule` at an instant [s], no earlier than the last one asked for."""
+        problem, row = self.problem, self.row
+        while self.event < len(problem.events) and problem.events[self.event].time <= time + NOW:
+            event = problem.events[self.event]
+            if event.motion is not None:
+                self.motion, self.began = event.motion, event.time
+            self.event += 1
+        changes = problem.gain_changes
+        while self.change < len(changes) and changes[self.change].start <= time + NOW:
+            self.change += 1
+        assert self.motion is not None  # there is one from the start
+        old, new = (changes[k] if k >= 0 else self.own for k in (self.change - 2, self.change - 1))
+        pushing = (i.numbers for i in problem.feedforward if i.start <= time + NOW < i.end)
+        values: dict[str, Any] = {
+            **row.environment.zeros(),
+            **problem.events[self.event - 1].environment,
+            **self.motion,
+            "began": self.began,
+            "feedforward": sum(pushing, np.zeros(6)),
+            "change_from": new.start,
+            "change_to": new.end,
+            "change_linear": float(new.linear),
+            "old_in_tool": np.array(old.in_tool, dtype=float),
+            "new_in_tool": np.array(new.in_tool, dtype=float),
+            "old_stiffness": old.stiffness,
+            "new_stiffness": new.stiffness,
+            "old_damping": old.damping,
+            "new_damping": new.damping,
+        }
+        return row.schedule.pack({f.name: values[f.name] for f in row.schedule})

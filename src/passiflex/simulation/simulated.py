@@ -16,9 +16,11 @@ from passiflex.problems.resolution import resolve
 from passiflex.runs.run import Run
 from passiflex.sampled.sensors import AbstractSensorEffect
 from passiflex.sampled.tank import AbstractTank
+from passiflex.scenarios.path import ViaPath
 from passiflex.scenarios.reference import AbstractReferenceEvent
 from passiflex.scenarios.scenario import Scenario
 from passiflex.scenarios.scenario_file import as_scenario
+from passiflex.scenarios.setpoints import Table
 from passiflex.simulation.through_time import simulate_problem
 
 
@@ -30,7 +32,7 @@ def simulate(
     tank: AbstractTank | None = None,
     elements: Sequence[AbstractElement] = (),
     sensors: Sequence[AbstractSensorEffect] = (),
-    reference: Sequence[AbstractReferenceEvent] = (),
+    reference: Sequence[AbstractReferenceEvent] | AbstractReferenceEvent = (),
     engine: str = NATIVE.name,
 ) -> Run:
     """Return the run of a scenario, of a mapping with the entries of a scenario file, or of the file at a path.
@@ -40,6 +42,7 @@ def simulate(
     Parameters
     ----------
     law, gains, tank, elements, sensors, reference: Parts of your own, as `problems.own_parts.with_parts` takes them.
+        A table of set-points and a path become part of the scenario, which then gives the same run again.
     engine: Who moves the plant of a sampled run: "passiflex", or "mujoco" with the extra of this name.
 
     Raises
@@ -47,7 +50,17 @@ def simulate(
     PassiflexError
         If the scenario has mistakes or does not fit its robot, or parts do not fit the scenario.
     """
-    problem = resolve(as_scenario(scenario))
+    given = as_scenario(scenario)
+    reference = [reference] if isinstance(reference, AbstractReferenceEvent) else reference
+    known: list[
+        AbstractReferenceEvent
+    ] = []  # what a scenario can write down, so that the run can be made again
+    if isinstance(reference, Sequence):
+        known = [event for event in reference if isinstance(event, ViaPath | Table)]
+        reference = [event for event in reference if not isinstance(event, ViaPath | Table)]
+    if known:
+        given = given.changed(reference=sorted([*given.reference, *known], key=lambda event: event.at))
+    problem = resolve(given)
     own = with_parts(
         problem, law=law, gains=gains, tank=tank, elements=elements, sensors=sensors, reference=reference
     )

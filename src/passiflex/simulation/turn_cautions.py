@@ -23,6 +23,10 @@ FAR = math.radians(150)
 """Beyond it a turn is worth a word: the spring has half its moment left, and less."""
 
 
+MOST_INSTANTS = 2000
+"""Of more, as a table of set-points may have, every second, third … is looked at."""
+
+
 class _Instant(NamedTuple):
     """From here on: the reference, blocks of K_x and D_x for the rotation, and the moment on the hand in world axes."""
 
@@ -89,17 +93,23 @@ def _instants(problem: Problem) -> Iterator[_Instant]:
     times = {e.time for e in problem.events} | {t for p in pushes for t in (p.start, p.end)}
     times |= {t for c in changes for t in (c.start, c.end)}
     motion: Motion = hold(problem.home)
-    began, wrench = 0.0, np.zeros(6)
-    for time in sorted(t for t in times if t < problem.duration):
-        for event in (e for e in problem.events if e.time == time):
+    began, wrench, begun, changed = 0.0, np.zeros(6), 0, 0
+    instants = sorted(t for t in times if t < problem.duration)
+    for time in instants[:: -(-len(instants) // MOST_INSTANTS)] if instants else []:
+        while begun < len(problem.events) and problem.events[begun].time <= time:
+            event, begun = problem.events[begun], begun + 1
             wrench = event.F_e
             if event.motion is not None:
-                motion, began = event.motion, time
+                motion, began = event.motion, event.time
         own = wrench + sum((p.numbers for p in pushes if p.start <= time < p.end), np.zeros(6))
-        stiffness, damping = [gains["stiffness"]], gains["damping"]
-        for change in (c for c in changes if c.start <= time):
-            stiffness = [change.stiffness] if time >= change.end else [stiffness[-1], change.stiffness]
-            damping = change.damping
+        while changed < len(changes) and changes[changed].start <= time:
+            changed += 1
+        before = changes[changed - 2].stiffness if changed > 1 else gains["stiffness"]
+        stiffness, damping = [before], gains["damping"]
+        if changed:
+            last = changes[changed - 1]
+            last = last.in_world(pose_at(motion, time - began).rotation, turned=problem.law.task.turned)
+            stiffness, damping = [*([] if time >= last.end else stiffness), last.stiffness], last.damping
         blocks = tuple(K[3:, 3:] for K in stiffness)
         yield _Instant(time, pose_at(motion, time - began), blocks, damping[3:, 3:], own[3:])
 

@@ -106,7 +106,7 @@ def law_cases(loop: LinearLoop) -> Iterator[Case]:
     s = loop.problem
     for delay in sorted({s.delay, s.delay + s.jitter}):
         yield Case("law", loop, delay, {})
-        for change in s.gain_changes:
+        for change in s.told_gains:
             yield Case("gains", loop, delay, {"stiffness": change.stiffness, "damping": change.damping})
 
 

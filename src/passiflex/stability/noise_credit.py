@@ -55,7 +55,7 @@ def noise_credit(problem: SampledProblem) -> float:
         return 0.0
     loop = LinearLoop(problem)
     later: list[Mapping[str, ArrayLike]] = [
-        {"stiffness": c.stiffness, "damping": c.damping} for c in problem.gain_changes
+        {"stiffness": c.stiffness, "damping": c.damping} for c in problem.told_gains
     ]
     powers = [
         mean_credit(loop.driven(gains=gains), loop.n, noise.variance, lasting) / problem.period
