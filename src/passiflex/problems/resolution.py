@@ -17,7 +17,8 @@ from passiflex.errors import ArgumentError, SizeError, ValueRangeError
 from passiflex.loops.closed_loop import ClosedLoop
 from passiflex.problems.placed import posture_at
 from passiflex.problems.problem import Noise, Problem, SampledProblem
-from passiflex.problems.sampling import Known, elements_of, sampled_parts
+from passiflex.problems.sampling import Known, sampled_parts
+from passiflex.problems.surroundings import elements_of
 from passiflex.problems.tank_numbers import tank_gains, tank_start
 from passiflex.problems.timeline import timeline
 from passiflex.robots.carried import carrying

@@ -9,35 +9,29 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from passiflex.control.law import AbstractLaw
-from passiflex.control.motion import Pose
 from passiflex.control.posture import Posture
 from passiflex.control.tank import NO_CAP
-from passiflex.elements import AbstractElement, MotorFriction, SpeedBrake, StickingFriction
-from passiflex.elements.end_stops import NO_END
 from passiflex.errors import SizeError
 from passiflex.loops.plant import Elements
 from passiflex.loops.sampled_loop import SampledLoop
-from passiflex.problems.problem import FROM_THE_START, GainChange, Lasting
+from passiflex.problems.per_joint import per_joint
+from passiflex.problems.problem import FROM_THE_START, GainChange
+from passiflex.problems.surroundings import feedforward_of
 from passiflex.robots.flexible import FlexibleJointRobot
 from passiflex.sampled.controller import SampledController
 from passiflex.sampled.measurement_bound import BEND
 from passiflex.sampled.motors import UNLIMITED_TORQUE
 from passiflex.sampled.sensors import UNFILTERED
 from passiflex.scenarios.control_settings import Actions, Control, MotorSettings, SensorSettings
-from passiflex.scenarios.environment import labelled
-from passiflex.scenarios.held_settings import Load
 from passiflex.scenarios.noise_settings import Noise
 from passiflex.scenarios.scenario import Scenario
 from passiflex.scenarios.setpoints import Table
 from passiflex.scenarios.tank_settings import TankSettings
-from passiflex.scenarios.touching import Site
 
 Array = NDArray[np.float64]
 
 POSTURE_RATIO = 0.7
 """Damping ratio of the spring to a posture, joint by joint, unless its damping is given."""
-BRAKING = 0.01
-"""Time [s] within which a motor comes back to its speed limit."""
 VELOCITY_GAIN, ACCELERATION_GAIN = 0.3, 0.05
 """Of the matched inner loop's estimates: of those that were tried at 1 kHz, the best compromise between the
 torque's noise and the lag in q̇, which acts as further inertia; from 0.2 on the second gain destabilises."""
@@ -76,7 +70,7 @@ def sampled_parts(
         tank.build() if tank and law.has_tank else None,
         control.build_external(),
         control.build_inner(),
-        actions=scenario.actions is not None or bool(_feedforward(scenario, robot)),
+        actions=scenario.actions is not None or bool(feedforward_of(scenario, robot)),
     )
     motors, sensors = scenario.motors or MotorSettings(), scenario.sensors or SensorSettings()
     moved = np.diag(known.start.mass_matrix) + gains.get("shaped_inertia", model["motor_inertia"])
@@ -110,70 +104,8 @@ def sampled_parts(
         "allow_unstable": control.allow_unstable,
         "held": known.start.gravity_torque,
         "gain_changes": _gain_changes(scenario, gains),
-        "feedforward": _feedforward(scenario, robot),
+        "feedforward": feedforward_of(scenario, robot),
     }
-
-
-def _feedforward(scenario: Scenario, robot: FlexibleJointRobot) -> tuple[Lasting, ...]:
-    """Return what the end effector is to exert: what was asked for, and what holds up the loads that the law knows."""
-    asked = [Lasting(f.start, f.end, np.array([*f.force, *f.moment])) for f in scenario.feedforward]
-    down = np.array(robot.arm.chain.gravity)
-    known = [e for e in scenario.environment if isinstance(e, Load) and e.known]
-    return (*asked, *(Lasting(e.start, e.end, np.array([*-e.mass * down, 0, 0, 0])) for e in known))
-
-
-def elements_of(scenario: Scenario, robot: FlexibleJointRobot, at: Pose) -> Elements:
-    """Return what touches a scenario's robot: friction first, whose books a sampled run always has; all drags are one.
-
-    Parameters
-    ----------
-    at: Where the end effector starts.
-
-    Raises
-    ------
-    SizeError, ValueRangeError
-        For friction of another number of joints, or an element that the robot is within at the start.
-    """
-    motors = scenario.motors or MotorSettings()
-    coulomb, viscous = (
-        _joints(robot, f"motors.{name}", getattr(motors, name))
-        for name in ("coulomb_friction", "viscous_friction")
-    )
-    rubs = bool(np.any(coulomb) or np.any(viscous))
-    friction: AbstractElement = MotorFriction(rubs, coulomb, viscous, motors.friction_width)
-    if motors.friction == "sticks" and np.any(coulomb):
-        friction = StickingFriction(
-            True, coulomb, viscous, motors.static_friction, motors.stribeck_speed, motors.break_away
-        )
-    brakes = _brakes(motors, robot)
-    entries = labelled(scenario.environment).items()
-    site = Site(robot, at, scenario.hand)
-    others = {e.structure: e for e in (entry.build(name, site) for name, entry in entries)}
-    for element in others.values():
-        element.require_apart(at)
-    return (*[friction] * (rubs or scenario.control is not None), *brakes, *others.values())
-
-
-def _brakes(motors: MotorSettings, robot: FlexibleJointRobot) -> Elements:
-    """Return what brakes motors beyond their speed limits, if they have any."""
-    if motors.speed_limit == "none":
-        return ()
-    limit = (
-        robot.velocity_limit
-        if motors.speed_limit == "robot"
-        else _joints(robot, "motors.speed_limit", motors.speed_limit)
-    )
-    return (SpeedBrake(limit=np.minimum(limit, NO_END), brake=robot.motor_inertia / BRAKING),)
-
-
-def _joints(robot: FlexibleJointRobot, name: str, value: ArrayLike) -> Array:
-    if np.size(value) not in (1, robot.n):
-        raise SizeError(
-            f"{name} does not fit robot {robot.name!r}",
-            got=f"{np.size(value)} numbers",
-            needs=f"one number or {robot.n}",
-        )
-    return np.broadcast_to(np.asarray(value, dtype=float), robot.n).copy()
 
 
 def _pole(frequency: float) -> float:
@@ -226,13 +158,13 @@ def _actions(
             got=f"{posture.size} angles",
             needs=f"{robot.n} angles in rad",
         )
-    stiffness = _joints(robot, "actions.posture_stiffness", actions.posture_stiffness)
+    stiffness = per_joint(robot, "actions.posture_stiffness", actions.posture_stiffness)
     damping: ArrayLike = 2 * POSTURE_RATIO * np.sqrt(stiffness * inertia)
     if actions.posture_damping is not None:
         damping = actions.posture_damping
     return {
         "posture_stiffness": stiffness,
-        "posture_damping": _joints(robot, "actions.posture_damping", damping),
+        "posture_damping": per_joint(robot, "actions.posture_damping", damping),
         "posture": posture,
         "follow_velocity": actions.follow_velocity,
         "follow_acceleration": actions.follow_acceleration,
@@ -249,7 +181,7 @@ def _sensors(sensors: SensorSettings, robot: FlexibleJointRobot) -> dict[str, Ar
         "wrench_bandwidth": _pole(sensors.wrench_bandwidth),
     }
     for name in ("torque_scale", "torque_offset", "link_offset", "motor_offset"):
-        numbers[name] = _joints(robot, f"sensors.{name}", getattr(sensors, name))
+        numbers[name] = per_joint(robot, f"sensors.{name}", getattr(sensors, name))
     return numbers
 
 
@@ -258,8 +190,8 @@ def _errors(
 ) -> dict[str, Array | float]:
     """Return how large the errors of the sensors are, which the law's books know; their signs they do not."""
     return {
-        "torque_scale": np.abs(_joints(robot, "sensors.torque_scale", sensors.torque_scale)),
-        "torque_offset": np.abs(_joints(robot, "sensors.torque_offset", sensors.torque_offset)),
+        "torque_scale": np.abs(per_joint(robot, "sensors.torque_scale", sensors.torque_scale)),
+        "torque_offset": np.abs(per_joint(robot, "sensors.torque_offset", sensors.torque_offset)),
         "torque_bandwidth": _pole(sensors.torque_bandwidth),
         "link_resolution": sensors.link_resolution,
         "noise_deviation": math.sqrt(noise.torque_variance) if noise else 0.0,
@@ -276,9 +208,11 @@ def _limits(motors: MotorSettings, robot: FlexibleJointRobot) -> dict[str, Array
     limit = (
         named[motors.torque_limit]
         if isinstance(motors.torque_limit, str)
-        else _joints(robot, "motors.torque_limit", motors.torque_limit)
+        else per_joint(robot, "motors.torque_limit", motors.torque_limit)
     )
-    rate = np.minimum(_joints(robot, "motors.torque_rate_limit", motors.torque_rate_limit), UNLIMITED_TORQUE)
+    rate = np.minimum(
+        per_joint(robot, "motors.torque_rate_limit", motors.torque_rate_limit), UNLIMITED_TORQUE
+    )
     return {"torque_limit": np.minimum(limit, UNLIMITED_TORQUE), "torque_rate_limit": rate}
 
 
