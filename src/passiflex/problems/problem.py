@@ -162,6 +162,7 @@ class SampledProblem(Problem):
     controller: The law with tank, governor and estimators.
     period, delay, jitter: [s].
     missed: Share of periods in which the law does not run.
+    lost: Bursts in which it does not either: when the first period is due [s], and how many there are.
     allow_unstable: Whether to run a loop that is unstable by the limit map.
     held: Motor torque at the start (n,).
     gain_changes: Of K_x and D_x, in the order of time.
@@ -179,6 +180,7 @@ class SampledProblem(Problem):
     gain_changes: tuple[GainChange, ...]
     feedforward: tuple[Lasting, ...]
     effects: tuple[AbstractSensorEffect, ...] = ()
+    lost: tuple[tuple[float, int], ...] = ()
 
     @cached_property
     def loop(self) -> SampledLoop:

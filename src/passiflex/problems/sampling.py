@@ -101,6 +101,7 @@ def sampled_parts(
         "delay": control.delay,
         "jitter": control.jitter,
         "missed": control.missed,
+        "lost": tuple((burst.at, burst.periods) for burst in control.lost),
         "allow_unstable": control.allow_unstable,
         "held": known.start.gravity_torque,
         "gain_changes": _gain_changes(scenario, gains),

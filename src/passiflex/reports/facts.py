@@ -104,6 +104,7 @@ def _control(scenario: Scenario) -> str:
     parts = [_hertz(control.rate), late]
     parts += [f"jitter up to {_seconds(control.jitter)}"] if control.jitter else []
     parts += [f"{control.missed:.3g} of the periods missed"] if control.missed else []
+    parts += [f"{sum(b.periods for b in control.lost)} lost in bursts"] if control.lost else []
     return ", ".join([*parts, f"{control.inner_loop} inner loop", f"τ_e: {control.external_torque}"])
 
 

@@ -59,6 +59,13 @@ class Fallback(Section):
     damping: Damping | None = Field(default=None, description="its D_x; the law's own if left out")
 
 
+class Burst(Section):
+    """Periods in a row in which the law does not run, as where packets are lost."""
+
+    at: Instant = Field(description="when the first of them is due, s")
+    periods: int = Field(ge=1, le=1_000_000, strict=True, description="how many they are")
+
+
 class Control(Section):
     """The law runs once per period; its command is held until the next one arrives."""
 
@@ -73,6 +80,9 @@ class Control(Section):
     )
     missed: Annotated[float, Quantity("1", least=0, most=0.9)] = Field(
         default=0.0, description="share of periods in which the law does not run, at random"
+    )
+    lost: tuple[Burst, ...] = Field(
+        default=(), description="bursts of periods in which it does not run either, as a log has them"
     )
     inner_loop: Literal["plain", "matched"] = Field(
         default="plain",

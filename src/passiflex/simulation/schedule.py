@@ -55,6 +55,9 @@ class Chance:
         runs: Array = np.ones(count)
         if self.problem.missed:
             runs[self.lost.random(count) < self.problem.missed] = 0.0
+        for due, periods in self.problem.lost:
+            begin = _first_period(due, self.problem.period) - first
+            runs[max(begin, 0) : max(begin + periods, 0)] = 0.0
         if first == 0:
             runs[0] = 1.0
         delay = self.problem.delay + (
