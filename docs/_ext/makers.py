@@ -80,6 +80,13 @@ def limits(folder: Path) -> None:
     save_figure(draw_limits(found), folder / "limits")
 
 
+def contact(folder: Path) -> None:
+    """Make the figure and report of the study `contact`, in our own engine alone."""
+    from passiflex.studies.contact import ENGINES, reproduce_contact
+
+    reproduce_contact(folder, engines=ENGINES[:1])
+
+
 def uncertainty(folder: Path) -> None:
     """Make the figure of the study `uncertainty`, of fewer robots than the study has."""
     from passiflex.studies.uncertainty import reproduce_uncertainty
@@ -161,6 +168,7 @@ GROUPS = (
         sampled,
     ),
     Group(("limits.png",), limits),
+    Group(("contact.png", "contact.html"), contact),
     Group(("uncertainty.png",), uncertainty),
     Group(("cards.md", *(f"card_{name}.html" for name, _ in commanded())), cards),
 )

@@ -229,7 +229,8 @@ def test_an_unknown_figure_names_the_nearest(shell: Shell, tmp_path: Path) -> No
     result = shell("reproduce", "figg1", "--out", tmp_path / "new")
     assert result.status == 2
     assert result.err.startswith(
-        "passiflex: unknown figure; got 'figg1'; needs one of fig1, fig2, fig3, sampled, uncertainty; try 'fig1'"
+        "passiflex: unknown figure; got 'figg1'; "
+        "needs one of contact, fig1, fig2, fig3, sampled, uncertainty; try 'fig1'"
     )
     assert len(result.err.splitlines()) == 1
     assert not (tmp_path / "new").exists()

@@ -222,4 +222,4 @@ def test_noise_that_outlasts_the_run_is_an_offset(seed: int) -> None:
     assert (error <= out.total + 1e-12).all()
     five = SIGMAS * 0.4 * np.linalg.norm((q - q[0])[:100], axis=1)
     assert (out.total[:100] >= 0.99 * five).all()
-    assert (out.total[:100] <= 1.3 * np.maximum.accumulate(five)).all()
+    assert (out.total[:100] <= 1.5 * np.maximum.accumulate(five)).all()

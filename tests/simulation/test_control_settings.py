@@ -188,8 +188,8 @@ ONLY = "needs `control`: only a sampled run has it"
         ("link_resolution: 0.01 deg", "torque_scale: 60 %", "line 13, column 25, sensors.torque_scale: expected one number or a list of numbers, ≥ -0.5, ≤ 0.5; got '60 %' (too large)"),
         ("link_resolution: 0.01 deg", "torque_offset: 3 N", "line 13, column 26, sensors.torque_offset: expected N m, one number or a list of numbers; got '3 N' (N)"),
         ("link_resolution: 0.01 deg", "link_offset: inf", "line 13, column 24, sensors.link_offset: expected rad, one number or a list of numbers; got 'inf' (not finite)"),
-        ("torque_limit: robot", "torque_limit: 30", "line 14, column 24, motors.torque_limit: unknown word 30; one of 'none', 'robot'"),
-        ("torque_limit: robot", "torque_rate_limit: 0", "line 14, column 29, motors.torque_rate_limit: expected N m/s, one number, > 0; got 0 (too small)"),
+        ("torque_limit: robot", "torque_limit: robots", "line 14, column 24, motors.torque_limit: expected none or robot or N m, one number or a list of numbers, > 0; got 'robots' (not a number with a unit)"),
+        ("torque_limit: robot", "torque_rate_limit: 0", "line 14, column 29, motors.torque_rate_limit: expected N m/s, one number or a list of numbers, > 0; got 0 (too small)"),
         ("torque_limit: robot", "coulomb_friction: [1, -1]", "line 14, column 28, motors.coulomb_friction: expected N m, one number or a list of numbers, ≥ 0; got [1, -1] (too small)"),
         # tank
         ("kind: port", "kind: prt", "line 15, column 14, tank.kind: unknown word 'prt'; try 'port'"),

@@ -172,7 +172,7 @@ SHAPED = "shaped_stiffness: {ratio: 10}"
         (
             "{ratio: 0.7}",
             "{ratio: 0.7, a b: 1}",
-            "line 10, column 25, law.damping.'a b': unknown name; one of 'translation', 'rotation', 'matrix', 'ratio'",
+            "line 10, column 25, law.damping.'a b': unknown name; one of 'translation', 'rotation', 'matrix', 'axes', 'ratio'",
         ),
         ("duration: 30 s\n", "", "line 1, column 1, duration: missing: simulated time, s"),
         (

@@ -23,12 +23,13 @@ from passiflex.reports.viewer import read_viewer
 from passiflex.robots import FlexibleJointRobot
 from passiflex.scenarios.law_settings import ImpedanceSettings
 from passiflex.simulation import Scenario
+from passiflex.studies.contact import reproduce_contact
 from passiflex.studies.paper import FIGURES, Case, Report, figure_cases
 from passiflex.studies.sampled import reproduce_sampled
 from passiflex.studies.summary import summarise
 from passiflex.studies.uncertainty import reproduce_uncertainty
 
-STUDIES = {"sampled": reproduce_sampled, "uncertainty": reproduce_uncertainty}
+STUDIES = {"contact": reproduce_contact, "sampled": reproduce_sampled, "uncertainty": reproduce_uncertainty}
 """Studies beyond the paper's figures."""
 TITLES = {
     "robot": "gravity: the robot's own compensation\n(as in the paper)",
@@ -42,7 +43,7 @@ def reproduce(
     """Run the given figures, and return what was written into `folder`, by figure.
 
     The paper's three if none is given; `sampled` is the study of the sampled world, `uncertainty` that of a
-    thousand robots.
+    thousand robots, `contact` that of hands that come to walls.
 
     Each figure gives a PNG, a PDF, its runs as netCDF and a page to look at one of them; all give their part
     of `summary.json`, which keeps what earlier calls wrote about other figures of the same version.
