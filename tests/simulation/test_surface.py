@@ -272,7 +272,7 @@ MISTAKES = {
     "within": (
         beside(point=[0, 0, -0.01]),
         r"the hand starts within plane; got 10 mm deep, with the end effector at .*; needs a start outside; .*; "
-        r"try a place 10 mm or more against \[0, 0, -1\], which is out of it",
+        r"try a place 10 mm or more along \[0, 0, 1\]",
     ),
     "swallowed": (
         {"kind": "sphere", "name": "planet", "centre": [0, 0, 0], "radius": 50, "stiffness": 100},

@@ -148,12 +148,12 @@ class Surface(AbstractElement):
             )
             depth = float(g["roundness"]) - distance
             if depth > ROUND_OFF:
-                way = ", ".join(f"{v:.3g}" for v in outward.round(4) + 0.0)
+                way = ", ".join(f"{v:.3g}" for v in 0.0 - outward.round(4))
                 raise ValueRangeError(
                     f"the hand starts within {self.label}",
                     got=f"{1e3 * depth:.3g} mm deep, with the end effector at {np.round(at.position, 4).tolist()} m",
                     needs="a start outside; a surface that is moved may come to the hand",
-                    try_=f"a place {1e3 * depth:.3g} mm or more against [{way}], which is out of it",
+                    try_=f"a place {1e3 * depth:.3g} mm or more along [{way}]",
                 )
 
     def act(self, at: Touch, s: Any, m: Any) -> Effect:
