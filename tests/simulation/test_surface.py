@@ -136,7 +136,7 @@ def linear(stiffness: float, damping: float, speed: float) -> float:
 def test_a_mass_bounces_off_as_the_closed_form_says(c: float, stiffness: float, speed: float) -> None:
     """Its energy to 1 %, at the step that a run takes; half the step is nearer."""
     w = math.sqrt(stiffness / MASS)
-    free = Mobility(1 / MASS, np.zeros(1), np.zeros(1))
+    free = Mobility(np.diag([1 / MASS] * 3 + [0.0] * 3), np.eye(3), np.zeros(1), np.zeros(1))
     for normal, damping, right in (
         (HuntCrossley(), c, hunt_crossley(c, speed)),
         (
@@ -266,6 +266,38 @@ def test_a_hand_of_several_points_is_pressed_at_those_that_touch() -> None:
     two = pressed(beside(), hand={"radius": 0.01, "points": [[0, 0, 0], [0, 0.3, 0]]})
     assert abs(one["plane_force"][-1, 2]) > 1
     np.testing.assert_allclose(two["plane_force"][-1, 2], one["plane_force"][-1, 2], rtol=0.02)
+
+
+@pytest.mark.parametrize(
+    "hard",
+    [
+        {"viscous": 3e4},
+        {"viscous": 3e4, "friction": 0.5},
+        {"law": "linear", "damping": 5e3},
+        {"stiffness": 1e7, "friction": 0.5, "bristle_stiffness": 1e7},
+    ],
+    ids=["viscous", "viscous and dry", "damped", "stiff"],
+)
+def test_what_is_fast_in_a_surface_is_resolved(hard: dict[str, Any]) -> None:
+    """Its damper, its viscous friction and its bristles as well as its spring; at points far from the end effector."""
+    far = {"points": [[0, 0, 0], [-0.3, 0.3, 0]], "radius": 0.005}
+    for hand in ({"radius": 0.01}, far):
+        tilted = beside(normal=[0.3, 0, -2], **hard)
+        run = pressed(
+            tilted, hand=hand, reference=[{"at": 0.1, "kind": "move", "by": [0.05, 0, 0.05], "duration": 0.3}]
+        )
+        assert np.abs(run["plane_force"]).max() > 1
+        assert environment_balance(run).worst < 2e-3 * np.abs(run["plane_given_energy"]).max()
+        assert audit(run).verdict == "passive"
+
+
+def test_a_point_far_from_the_end_effector_is_moved_as_a_lever_says() -> None:
+    """Of a body that turns about the end effector alone: r²/I."""
+    free = Mobility(
+        np.diag([0, 0, 0, 0, 0, 2.0]), Rotation.from_rotvec([0, 0, 1.0]).as_matrix(), np.zeros(1), np.zeros(1)
+    )
+    assert free.at([0.3, 0.4, 0.7]) == pytest.approx(2 * 0.25)
+    assert free.at([0, 0, 1]) == pytest.approx(0)
 
 
 MISTAKES = {

@@ -10,6 +10,7 @@ from passiflex.elements.element import Touch as Touch
 from passiflex.elements.element import nothing as nothing
 from passiflex.elements.end_stops import EndStops as EndStops
 from passiflex.elements.friction import MotorFriction as MotorFriction
+from passiflex.elements.friction import StickingFriction as StickingFriction
 from passiflex.elements.held import Held as Held
 from passiflex.elements.motion import motion_of as motion_of
 from passiflex.elements.normal import AbstractNormal as AbstractNormal
@@ -20,6 +21,5 @@ from passiflex.elements.shapes import Box as Box
 from passiflex.elements.shapes import Cylinder as Cylinder
 from passiflex.elements.shapes import Plane as Plane
 from passiflex.elements.shapes import Sphere as Sphere
-from passiflex.elements.sticking import SpeedBrake as SpeedBrake
-from passiflex.elements.sticking import StickingFriction as StickingFriction
+from passiflex.elements.speed_brake import SpeedBrake as SpeedBrake
 from passiflex.elements.surface import Surface as Surface

@@ -79,13 +79,22 @@ class Mobility(NamedTuple):
 
     Attributes
     ----------
-    tip: Of the end effector, by a force in the direction in which it moves most easily [1/kg].
+    tip: J M⁻¹ Jᵀ of the end effector, in world axes (6, 6) [1/kg, 1/(kg m), 1/(kg m²)].
+    axes: Of the end effector, as columns in world axes (3, 3).
     links, motors: Of each link and motor (n,) [1/(kg m²)].
     """
 
-    tip: float
+    tip: NDArray[np.float64]
+    axes: NDArray[np.float64]
     links: NDArray[np.float64]
     motors: NDArray[np.float64]
+
+    def at(self, point: ArrayLike) -> float:
+        """Return that of a point of the hand (3,) m, in its axes, by the force that moves it most easily [1/kg]."""
+        x, y, z = self.axes @ np.asarray(point, dtype=float)
+        turned = np.array([[0, z, -y], [-z, 0, x], [y, -x, 0]])  # velocity at the point by a spin: ω × r
+        moved = np.hstack([np.eye(3), turned])
+        return float(np.linalg.norm(moved @ self.tip @ moved.T, 2))
 
 
 class Books(NamedTuple):

@@ -11,7 +11,8 @@ import casadi as cs
 import numpy as np
 from numpy.typing import ArrayLike
 
-from passiflex.elements.element import AbstractElement, Effect, Mobility, Touch, nothing
+from passiflex.elements.element import Effect, Mobility, Touch, nothing
+from passiflex.elements.labelled import AbstractLabelled
 from passiflex.layout import Field, Layout
 
 LET_GO = 5e-3
@@ -20,7 +21,7 @@ LET_GO = 5e-3
 
 @final
 @dataclass(frozen=True)
-class Held(AbstractElement):
+class Held(AbstractLabelled):
     """A point mass m on a grip k, d at a point of the hand, while it is gripped.
 
         m v̇ = f + m g + F − K u − D v,   f = k s + d ṡ,   ṡ = v_hand − v,   u̇ = v
@@ -45,21 +46,9 @@ class Held(AbstractElement):
     values: Mapping[str, ArrayLike] = field(default_factory=dict, compare=False)
 
     @property
-    def name(self) -> str:
-        """Return what a run calls it."""
-        return self.label
-
-    @property
     def structure(self) -> Hashable:
         """Return what its code depends on: its numbers are parameters."""
         return type(self), self.acts, self.label, self.anchored
-
-    def _called(self, *fields: Field) -> Layout:
-        return Layout(tuple(f._replace(name=f"{self.label}_{f.name}") for f in fields))
-
-    def _own(self, view: Any, fields: Layout) -> Any:
-        begin = len(self.label) + 1
-        return SimpleNamespace(**{f.name[begin:]: getattr(view, f.name) for f in fields})
 
     def parameters(self, n: int) -> Layout:
         """Return its mass, its grip, and what draws it back."""
@@ -96,12 +85,12 @@ class Held(AbstractElement):
 
     def rate(self, free: Mobility) -> float:
         """Return how fast hand and mass swing on the grip."""
-        g = {"mass": 1.0, "grip_stiffness": 0.0, "grip_damping": 0.0, "arm_damping": 0.0, **self.values}
-        mass, k, d, arm = (
-            float(np.max(g[name])) for name in ("mass", "grip_stiffness", "grip_damping", "arm_damping")
-        )
-        mobility = free.tip + 1 / mass
-        return float(np.sqrt(k * mobility)) + d * mobility + arm / mass
+        g = self._own(SimpleNamespace(**self.numbers(0)), self.parameters(0))
+        mass, own = float(g.mass), free.at(g.grasp)
+        mobility = own + 1 / mass
+        grip = np.sqrt(g.grip_stiffness * mobility) + g.grip_damping * mobility
+        arm = np.sqrt(g.arm_stiffness / mass) + g.arm_damping / mass
+        return float(grip + arm)
 
     def act(self, at: Touch, s: Any, m: Any) -> Effect:
         """Return what it does to the hand."""

@@ -13,12 +13,14 @@ from numpy.typing import ArrayLike
 
 from passiflex.control.motion import Pose
 from passiflex.elements.bristle import slipping
-from passiflex.elements.element import AbstractElement, Effect, Mobility, Touch, nothing
+from passiflex.elements.element import Effect, Mobility, Touch, nothing
+from passiflex.elements.labelled import AbstractLabelled
 from passiflex.elements.motion import POSITION, place_at
 from passiflex.elements.normal import AbstractNormal, HuntCrossley
 from passiflex.elements.shapes import AbstractShape, Plane
 from passiflex.errors import ValueRangeError
 from passiflex.layout import Field, Layout, Signal
+from passiflex.robots.flexible import RobotState
 
 ROUND_OFF = 1e-9
 """Depth [m] at which a hand is taken to be no more than on a surface."""
@@ -30,6 +32,7 @@ class _Point(NamedTuple):
     """What happens at one point of the hand, in world axes."""
 
     depth: cs.SX
+    outward: cs.SX
     lever: cs.SX
     force: cs.SX
     lost: cs.SX
@@ -39,7 +42,7 @@ class _Point(NamedTuple):
 
 @final
 @dataclass(frozen=True)
-class Surface(AbstractElement):
+class Surface(AbstractLabelled):
     """A body of a shape, at rest or moved, which points of the hand may touch; each is a small sphere.
 
     At each point it presses back along its normal by a law of the depth, and rubs: dry friction μ f by a bristle that
@@ -73,23 +76,10 @@ class Surface(AbstractElement):
         return self.moved
 
     @property
-    def name(self) -> str:
-        """Return what a run calls it."""
-        return self.label
-
-    @property
     def structure(self) -> Hashable:
         """Return what its code depends on: its numbers are parameters."""
         shape, normal = type(self.shape), type(self.normal)
         return type(self), self.acts, self.label, shape, normal, self.points, self.rubs, self.moved
-
-    def _own(self, view: Any, fields: Layout) -> Any:
-        """Return its own part of a view, by names without its label."""
-        begin = len(self.label) + 1
-        return SimpleNamespace(**{f.name[begin:]: getattr(view, f.name) for f in fields})
-
-    def _called(self, fields: tuple[Field, ...]) -> Layout:
-        return Layout(tuple(f._replace(name=f"{self.label}_{f.name}") for f in fields))
 
     def parameters(self, n: int) -> Layout:
         """Return where it is, and what it is made of."""
@@ -98,17 +88,15 @@ class Surface(AbstractElement):
             Field("bristle_stiffness", (), "N/m", "against what it sticks to"),
         )
         return self._called(
-            (
-                Field("place", (3,), "m", "origin of its axes, in world axes"),
-                Field("axes", (3, 3), "1", "its axes, as columns in world axes"),
-                *self.shape.fields(),
-                Field("stiffness", (), "N/m", "k of the surface"),
-                Field("damping", (), self.normal.damping_unit, "of the surface, along its normal"),
-                Field("viscous", (), "N s/m", "against sliding"),
-                *rubbing[: 2 * self.rubs],
-                Field("points", (self.points, 3), "m", "of the hand, in the axes of the end effector"),
-                Field("roundness", (), "m", "radius of the hand at these points"),
-            )
+            Field("place", (3,), "m", "origin of its axes, in world axes"),
+            Field("axes", (3, 3), "1", "its axes, as columns in world axes"),
+            *self.shape.fields(),
+            Field("stiffness", (), "N/m", "k of the surface"),
+            Field("damping", (), self.normal.damping_unit, "of the surface, along its normal"),
+            Field("viscous", (), "N s/m", "against sliding"),
+            *rubbing[: 2 * self.rubs],
+            Field("points", (self.points, 3), "m", "of the hand, in the axes of the end effector"),
+            Field("roundness", (), "m", "radius of the hand at these points"),
         )
 
     def numbers(self, n: int) -> Mapping[str, ArrayLike]:
@@ -120,35 +108,33 @@ class Surface(AbstractElement):
 
     def inputs(self) -> Layout:
         """Return how it moves."""
-        return self._called(POSITION.fields * self.moved)
+        return self._called(*POSITION.fields * self.moved)
 
     def state(self, n: int) -> Layout:
         """Return how its bristles are bent, in world axes, and its clock."""
         bristles = Field("bristles", (self.points, 3), "m", "bent by", ("point", "axis"), kept=False)
         clock = Field("clock", (), "s", "time by which it moves", kept=False)
-        return self._called((*[bristles] * self.rubs, *[clock] * self.moved))
+        return self._called(*[bristles] * self.rubs, *[clock] * self.moved)
 
     def rate(self, free: Mobility) -> float:
-        """Return how fast the end effector swings on it."""
-        numbers = {name: float(np.max(self.values.get(name, 0.0))) for name in ("stiffness", "damping")}
-        sliding = max(float(np.max(self.values.get(name, 0.0))) for name in ("viscous", "bristle_stiffness"))
-        return max(self.normal.pole(free.tip, **numbers), float(np.sqrt(sliding * self.rubs * free.tip)))
+        """Return how fast the hand swings on it, with all its points."""
+        g = self._own(SimpleNamespace(**self.numbers(0)), self.parameters(0))
+        mobility = sum(free.at(point) for point in np.reshape(g.points, (-1, 3)))
+        along = self.normal.pole(mobility, float(g.stiffness), float(g.damping))
+        sticking = float(np.sqrt(g.bristle_stiffness * mobility)) if self.rubs else 0.0
+        return max(along, sticking + float(g.viscous) * mobility)
 
     def require_apart(self, at: Pose) -> None:
         """Raise ValueRangeError if the hand starts within it."""
-        g: dict[str, Any] = {"axes": np.eye(3), **self.values}
-        sizes = {k: cs.SX(v) for k, v in self.shape.numbers().items()}
-        place, axes = np.asarray(g["place"]), np.asarray(g["axes"])
-        for point in np.reshape(g["points"], (-1, 3)):
-            away = axes.T @ (at.position + at.rotation @ point - place)
-            nearest = self.shape.nearest(cs.SX(away), sizes)
-            distance, outward = (
-                np.array(cs.evalf(nearest.distance)).item(),
-                axes @ np.array(cs.evalf(nearest.outward)).ravel(),
-            )
-            depth = float(g["roundness"]) - distance
+        none, still, axes = cs.SX(0, 1), cs.SX.zeros(3), cs.SX(at.rotation)
+        own = self.state(0).view(cs.SX.zeros(self.state(0).size))
+        rest = Touch(RobotState(*[none] * 4), still, still, cs.SX(at.position), cs.SX.eye(3), axes, own)
+        numbers, inputs = self.parameters(0), self.inputs()
+        m = numbers.view(cs.SX(numbers.pack(dict(self.numbers(0)))))
+        for touch in self._touches(rest, inputs.view(cs.SX.zeros(inputs.size)), m):
+            depth, *outward = np.array(cs.evalf(cs.vertcat(touch.depth, touch.outward))).ravel()
             if depth > ROUND_OFF:
-                way = ", ".join(f"{v:.3g}" for v in 0.0 - outward.round(4))
+                way = ", ".join(f"{v:.3g}" for v in 0.0 - np.round(outward, 4))
                 raise ValueRangeError(
                     f"the hand starts within {self.label}",
                     got=f"{1e3 * depth:.3g} mm deep, with the end effector at {np.round(at.position, 4).tolist()} m",
@@ -227,7 +213,7 @@ class Surface(AbstractElement):
         force = pressed.force * outward - viscous * sliding
         lost = pressed.lost + viscous * cs.sumsqr(sliding)
         if bent is None:
-            return _Point(depth, lever, force, lost, pressed.stored, cs.SX(0, 1))
+            return _Point(depth, outward, lever, force, lost, pressed.stored, cs.SX(0, 1))
         flat = bent - outward * cs.dot(outward, bent)
         slips = slipping(bent, touching * sliding, g.friction * pressed.force / g.bristle_stiffness)
         # Along the normal, which turns on a curved surface, a bristle is no use, and is let go like a slipping one.
@@ -235,6 +221,7 @@ class Surface(AbstractElement):
         friction = -touching * g.bristle_stiffness * flat
         return _Point(
             depth,
+            outward,
             lever,
             force + friction,
             lost + g.bristle_stiffness * (slips.lost + cs.dot(upright, bent)),

@@ -85,8 +85,8 @@ def longest_step(problem: SampledProblem, plant: NativeFunction) -> float:
 def mobility(problem: SampledProblem) -> Mobility:
     """Return how easily the robot is moved where it may be touched, at its start."""
     at, plant = standing(problem), problem.parts.unpack("plant", problem.numbers)
-    J, free = at.arm.jacobian[:3], np.linalg.inv(at.arm.mass_matrix)
-    return Mobility(float(np.linalg.norm(J @ free @ J.T, 2)), np.diag(free), 1 / plant["motor_inertia"])
+    J, free = at.arm.jacobian, np.linalg.inv(at.arm.mass_matrix)
+    return Mobility(J @ free @ J.T, at.arm.pose.rotation, np.diag(free), 1 / plant["motor_inertia"])
 
 
 def sample_count(problem: SampledProblem) -> int:
