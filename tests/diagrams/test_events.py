@@ -63,6 +63,31 @@ def test_forces_gains_drags_and_feed_forward_are_told_in_the_order_of_time() -> 
     assert len(spans_of(run)) == 5
 
 
+def test_what_is_held_for_a_time_goes_by_its_name() -> None:
+    """What is there throughout is no event: surfaces and end stops."""
+    environment = [
+        {"kind": "load", "name": "box", "from": 0.2, "to": 0.4, "mass": 0.5},
+        {"kind": "person", "from": 0.6, "to": 3},
+        {"kind": "drag", "from": 0.1, "to": 0.3, "viscous": 5},
+        {"kind": "drag", "from": 0.5, "to": 0.7, "viscous": 5},
+        {"kind": "plane", "point": [0, 0, -1], "normal": [0, 0, 1], "stiffness": 1e4},
+        {"kind": "end_stops"},
+    ]
+    run = configured(environment=environment)
+    assert spans_of(run) == (
+        Span(0.2, 0.4, "box", "force"),
+        Span(0.6, 1.0, "person", "force"),
+        Span(0.1, 0.3, "drag", "force"),
+        Span(0.5, 0.7, "drag_2", "force"),
+    )
+    assert [(m.time, m.label) for m in marks_of(run)] == [
+        (0.1, "drag"),
+        (0.2, "box"),
+        (0.5, "drag_2"),
+        (0.6, "person"),
+    ]
+
+
 def test_what_was_to_come_after_an_early_end_did_not_happen() -> None:
     run = configured(reference=REFERENCE, forces=[{"from": 0.6, "to": 0.8, "force": [0, 0, 1]}])
     cut = Run(run.data.isel(time=slice(0, 31)))  # to 0.3 s
@@ -130,8 +155,19 @@ def test_a_stiffness_that_nobody_changes_is_not_held_back() -> None:
     run = made_up(count=4, reference_share=reference, stiffness_share=np.zeros(4))
     scenario = PUSHED | {"law": POSE, "reference": [], "forces": [], "control": CONTROL}
     change = {"at": 0.1, "duration": 0.1, "stiffness": {"translation": 80, "rotation": 80}}
-    for gains, label in (([], "reference held back"), ([change], "reference and stiffness held back")):
-        known = altered(run, scenario=yaml.safe_dump(scenario | {"gains": gains}))
+    rows = "t,kx,ky,kz,krx,kry,krz\n0.1,80,80,80,80,80,80\n"
+    in_tool = {"law": POSE | {"stiffness": {"translation": 60, "rotation": 60, "axes": "tool"}}}
+    alone, both = "reference held back", "reference and stiffness held back"
+    cases: list[tuple[dict[str, object], str]] = [
+        ({}, alone),
+        ({"gains": [change]}, both),
+        ({"reference": {"rows": rows}}, both),
+        ({"reference": {"rows": "t,x,y,z\n0.1,0,0,0\n", "relative": True}}, alone),
+        (in_tool | {"reference": REFERENCE[:1]}, alone),
+        (in_tool | {"reference": REFERENCE[:2]}, both),  # it turns
+    ]
+    for changes, label in cases:
+        known = altered(run, scenario=yaml.safe_dump(scenario | changes))
         assert [s.label for s in spans_of(known) if s.kind == "governor"] == [label]
 
 

@@ -178,11 +178,20 @@ def test_the_ideal_of_one_axis_is_the_closed_form() -> None:
         {"drags": DRAG},
         {"feedforward": [{"from": 0.1, "to": 0.2, "force": [0, 0, 1]}]},
         {"gains": [{"at": 0.3, "duration": 0.1, "stiffness": {"translation": 80}}]},
+        {"reference": {"rows": "t,kx,ky,kz\n0.3,80,80,80\n"}},
+        {"reference": {"rows": "t,dx,dy,dz\n0.3,10,10,10\n"}},
+        {"law": PUSHED["law"] | {"stiffness": {"translation": [60, 30, 60], "axes": "tool"}}},
+        {"law": PUSHED["law"] | {"damping": {"translation": [20, 10, 20], "axes": "tool"}}},
+        {"environment": [{"kind": "plane", "point": [0, 0, -1], "normal": [0, 0, 1], "stiffness": 1e4}]},
+        {"environment": [{"kind": "load", "from": 0.2, "to": 0.4, "mass": 0.5}]},
+        {"environment": [{"kind": "person", "from": 0.2, "to": 0.4}]},
+        {"environment": [{"kind": "end_stops"}]},
     ],
 )
 def test_there_is_no_ideal_where_something_acts_that_it_does_not_know(changes: dict[str, object]) -> None:
     scenario = PUSHED | {"control": CONTROL} | changes
     run = altered(continuous(), scenario=yaml.safe_dump(scenario))
+    assert run.scenario is not None
     assert ideal_motion(run) is None
     known = altered(continuous(), scenario=yaml.safe_dump(PUSHED | {"control": CONTROL}))
     assert ideal_motion(known) is not None

@@ -157,6 +157,9 @@ def test_the_first_step_that_moves_counts() -> None:
 
 
 SOFT = {"translation": 100}
+TABLE = {"kind": "table", "at": 0.0, "relative": True}
+GOING_OVER = "t,kx,ky,kz\n0.1,200,200,200\n0.5,100,100,100\n0.55,90,90,90\n"
+"""Its gains go on from 0.1 to 0.5 s, whatever comes to the reference meanwhile; what was to begin later does not."""
 
 
 @pytest.mark.parametrize(
@@ -171,6 +174,13 @@ SOFT = {"translation": 100}
         ({"feedforward": [{"from": 0.25, "to": 0.4, "force": [1, 0, 0]}]}, 0.25),
         ({"gains": [{"at": 0.3, "duration": 0.1, "stiffness": SOFT}]}, 0.3),
         ({"gains": [{"at": 0.15, "duration": 0.1, "stiffness": SOFT}]}, 0.25),
+        ({"reference": [{**TABLE, "rows": GOING_OVER}, STEP]}, 0.5),
+        ({"reference": [{**TABLE, "rows": GOING_OVER, "between": "held"}, STEP]}, 0.6),
+        ({"reference": [STEP, {**TABLE, "at": 0.3, "rows": "t,x,y,z\n0,0,0,0\n0.1,0,0,0.1\n"}]}, 0.3),
+        (
+            {"reference": [STEP, {"at": 0.3, "kind": "path", "points": [{"after": 0.1, "by": [0, 0, 0.1]}]}]},
+            0.3,
+        ),
     ],
 )
 def test_the_window_ends_at_the_next_event_of_any_kind(changes: dict[str, Any], end: float) -> None:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
 from passiflex.diagrams.panel import Array, Mark, Span
 from passiflex.runs.run import Run
-from passiflex.scenarios.environment import Drag
+from passiflex.scenarios.environment import labelled
 from passiflex.scenarios.scenario import Force, Scenario
 
 GOVERNED = ("reference", "stiffness")
@@ -33,7 +35,7 @@ def spans_of(run: Run) -> tuple[Span, ...]:
     scenario, end = run.scenario, _end(run)
     forces = _forces(scenario) if scenario is not None else []
     inside = [s._replace(end=min(s.end, end)) for s in forces if s.start < end]
-    changing = scenario is None or bool(scenario.gain_changes)
+    changing = scenario is None or scenario.gains_change
     return (*inside, *_governed(run, GOVERNED if changing else GOVERNED[:1]), *_fallback(run))
 
 
@@ -42,12 +44,11 @@ def _end(run: Run) -> float:
 
 
 def _forces(scenario: Scenario) -> list[Span]:
-    """Return what acts on the end effector, or is exerted by it, for some time."""
+    """Return what acts on the end effector, is held or exerted by it, for some time."""
     spans = [Span(f.start, f.end, _wrench(f), "force") for f in scenario.forces]
     spans += [Span(f.start, f.end, "feed-forward wrench", "force") for f in scenario.feedforward]
-    return spans + [
-        Span(d.start, d.end, d.kind, "force") for d in scenario.environment if isinstance(d, Drag)
-    ]
+    there = ((*entry.lasts, label) for label, entry in labelled(scenario.environment).items())
+    return spans + [Span(*entry, "force") for entry in there if math.isfinite(entry[1])]
 
 
 def _wrench(force: Force) -> str:

@@ -24,14 +24,16 @@ def ideal_motion(run: Run) -> Array | None:
     """Return the displacement of M_x ẍ + D_x ẋ + K_x (x − x_d) = F_e at the rows of a run, (N, 3) m.
 
     None if the scenario cannot be read or its robot not be found, and where something acts that the
-    ideal does not know: gains that change in flight, drags, feed-forward wrenches, free directions, parts of one's own.
+    ideal does not know: gains that change in flight or are in tool axes, what touches the robot, feed-forward wrenches,
+    free directions, parts of one's own.
     """
     scenario = run.scenario
     if run.own_parts:
         return None
-    if scenario is None or scenario.gain_changes or scenario.environment or scenario.feedforward:
+    if scenario is None or scenario.gains_change or scenario.environment or scenario.feedforward:
         return None
-    if scenario.law.stiffness.free:
+    law = scenario.law
+    if law.stiffness.free or law.stiffness.in_tool or law.damping.in_tool:
         return None
     gains = _gains(run, scenario)
     if gains is None:

@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from passiflex.metrics.numbers import overshoot, rms, settling_time
-from passiflex.scenarios.reference import Step
+from passiflex.scenarios.reference import AbstractReferenceEvent, Step
 from passiflex.scenarios.scenario import Scenario
+from passiflex.scenarios.setpoints import Table
 
 Array = NDArray[np.float64]
 
@@ -28,15 +29,26 @@ def step_window(scenario: Scenario) -> StepWindow | None:
     step = next((e for e in scenario.reference if isinstance(e, Step) and any(e.by)), None)
     if step is None:
         return None
-    times = [e.at for e in scenario.reference] + [
-        t for c in scenario.gain_changes for t in (c.at, c.at + c.duration)
-    ]
+    times = [t for e in scenario.reference for t in _instants(e, scenario)]
+    times += [t for c in scenario.gain_changes for t in (c.at, c.at + c.duration)]
     for entries in (scenario.forces, scenario.feedforward):
         times += [t for entry in entries for t in (entry.start, entry.end)]
     times += [t for entry in scenario.environment for t in entry.lasts]
     size = float(np.linalg.norm(step.by))
     end = min([t for t in times if t > step.at] + [scenario.duration])
     return StepWindow(size, np.array(step.by) / size, step.at, end)
+
+
+def _instants(event: AbstractReferenceEvent, scenario: Scenario) -> list[float]:
+    """Return when an event begins, and when each change of gains in it begins and ends [s].
+
+    Its motions end with the event that comes next; gains that have begun to go over to a row go on.
+    """
+    if not isinstance(event, Table):
+        return [event.at]
+    end = min([e.at for e in scenario.reference if e.at > event.at] + [scenario.duration])
+    rows = (row for row in event.gains(scenario.seed) if row.start < end)
+    return [event.at, *(t for row in rows for t in (row.start, row.end))]
 
 
 def displacement(position: Array) -> Array:

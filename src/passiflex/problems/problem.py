@@ -27,8 +27,6 @@ Array = NDArray[np.float64]
 NOTHING: Mapping[str, ArrayLike] = MappingProxyType({})
 FROM_THE_START = -1.0
 """Instant [s] of the change to gains that the law has in tool axes: they are in force from the first period on."""
-MOST_JUDGED = 40
-"""Gains that a scenario goes over to, of which each is judged."""
 
 
 class Event(NamedTuple):
@@ -189,22 +187,11 @@ class SampledProblem(Problem):
 
     @cached_property
     def told_gains(self) -> tuple[GainChange, ...]:
-        """Return those of the changes of gains that a judge looks at: each once, and of very many the extremes.
-
-        They are as they would be at the start, in world axes.
-
-        Those are the ones with the least and the largest of each number on the diagonals, and some in between.
-        """
+        """Return the gains that the law goes over to, each once, as they would be at the start, in world axes."""
         turned = self.law.task.turned
         told = (c.in_world(self.home.rotation, turned=turned) for c in self.gain_changes)
         different = {(c.stiffness.tobytes(), c.damping.tobytes()): c for c in told}
-        changes = tuple(different.values())
-        if len(changes) <= MOST_JUDGED:
-            return changes
-        numbers = np.array([np.concatenate([np.diag(c.stiffness), np.diag(c.damping)]) for c in changes])
-        between = np.linspace(0, len(changes) - 1, MOST_JUDGED - 2 * numbers.shape[1]).astype(int)
-        which = {*numbers.argmin(axis=0).tolist(), *numbers.argmax(axis=0).tolist(), *between.tolist()}
-        return tuple(changes[i] for i in sorted(which))
+        return tuple(different.values())
 
     @cached_property
     def parts(self) -> Parts:

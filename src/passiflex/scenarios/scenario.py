@@ -19,7 +19,7 @@ from passiflex.scenarios.control_settings import (
     gain_mistakes,
 )
 from passiflex.scenarios.environment import Touching, as_drags, labelled
-from passiflex.scenarios.events import ReferenceEvent, event_mistakes
+from passiflex.scenarios.events import ReferenceEvent, event_mistakes, turning
 from passiflex.scenarios.law_settings import LawSettings
 from passiflex.scenarios.model_errors import Deviations, ModelErrors
 from passiflex.scenarios.noise_settings import Noise
@@ -265,6 +265,13 @@ class Scenario(Section):
         if mistake := interval_mistake(interval, info.data):
             raise ValueError(mistake)
         return interval
+
+    @property
+    def gains_change(self) -> bool:
+        """Return whether K_x or D_x change in flight: by a change, a table's rows, or in tool axes that turn."""
+        in_tool = self.law.stiffness.in_tool or self.law.damping.in_tool
+        tables = any(isinstance(e, Table) and e.changes_gains for e in self.reference)
+        return bool(self.gain_changes) or tables or (in_tool and any(turning(e) for e in self.reference))
 
     def to_yaml(self) -> str:
         """Return the text of a file that loads to an equal scenario: complete and in SI units."""

@@ -13,6 +13,7 @@ from typing import Literal, NamedTuple
 from passiflex.problems.problem import Problem
 from passiflex.stability.law_slope import Gains
 from passiflex.stability.linear_loop import LinearLoop
+from passiflex.stability.many_gains import judged_gains
 from passiflex.stability.missed import dies_out
 from passiflex.stability.modes import Spectrum
 
@@ -102,11 +103,11 @@ def judged_fallback(problem: Problem) -> Judgement | None:
 
 
 def law_cases(loop: LinearLoop) -> Iterator[Case]:
-    """Yield the law's own gains and those that it goes over to, at both ends of the jitter."""
+    """Yield the law's own gains and those that it goes over to, of very many the worst, at both ends of the jitter."""
     s = loop.problem
     for delay in sorted({s.delay, s.delay + s.jitter}):
         yield Case("law", loop, delay, {})
-        for change in s.told_gains:
+        for change in judged_gains(loop, delay):
             yield Case("gains", loop, delay, {"stiffness": change.stiffness, "damping": change.damping})
 
 

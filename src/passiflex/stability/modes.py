@@ -90,7 +90,7 @@ class Modes:
         tight = matrix[np.ix_(kept, kept)]
         values = np.linalg.eigvals(tight)
         out = values[~(np.abs(values) < 1)]
-        if (~(np.abs(alone) < 1)).any() or (~_slow(out, period)).any():
+        if (~(np.abs(alone) < 1)).any() or (~lingers(out, period)).any():
             return False
         return bool(drift_of(tight, out, period, task_jacobian).all())
 
@@ -141,7 +141,7 @@ def trembles(values: NDArray[Any], period: float) -> Flags:
 def drift_of(matrix: Array, values: NDArray[Any], period: float, task_jacobian: Array) -> Flags:
     """Return which eigenvalues of a map are drift, with the vectors of those alone that may be."""
     flags = np.zeros(values.size, dtype=bool)
-    slow = np.flatnonzero(_slow(values, period)) if _redundant(task_jacobian) else np.zeros(0, dtype=int)
+    slow = np.flatnonzero(lingers(values, period)) if _redundant(task_jacobian) else np.zeros(0, dtype=int)
     if slow.size:
         vectors = np.stack([_vector(matrix, values[i]) for i in slow], axis=1)
         flags[slow] = self_motion(values[slow], vectors, period, task_jacobian)
@@ -171,14 +171,15 @@ def self_motion(values: NDArray[Any], vectors: NDArray[Any], period: float, task
     if not _redundant(task_jacobian):
         return flags
     reach = np.linalg.norm(task_jacobian, 2)
-    slow = np.flatnonzero(_slow(values, period))
+    slow = np.flatnonzero(lingers(values, period))
     q = vectors[:n, slow]
     share = np.linalg.norm(task_jacobian @ q, axis=0) / np.maximum(reach * np.linalg.norm(q, axis=0), 1e-300)
     flags[slow] = share < DRIFT_SHARE
     return flags
 
 
-def _slow(values: NDArray[Any], period: float) -> Flags:
+def lingers(values: NDArray[Any], period: float) -> Flags:
+    """Return which eigenvalues are of motions that last and hardly move: drift, or what looks like it."""
     rate = np.abs(np.log(np.where(values == 0, 1e-300, values).astype(complex))) / period
     return (np.abs(values) > 1 - HELD) & (rate < DRIFT_RATE)
 

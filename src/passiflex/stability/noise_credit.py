@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from passiflex.problems.problem import SampledProblem
 from passiflex.stability.linear_loop import DrivenLoop, LinearLoop
+from passiflex.stability.many_gains import FEW, extremes
 
 POSTURES = 1.5
 """Factor on the credit at the start, for other postures on the way: of 40 random ones of the iiwa 14, the median had
@@ -55,7 +56,7 @@ def noise_credit(problem: SampledProblem) -> float:
         return 0.0
     loop = LinearLoop(problem)
     later: list[Mapping[str, ArrayLike]] = [
-        {"stiffness": c.stiffness, "damping": c.damping} for c in problem.told_gains
+        {"stiffness": c.stiffness, "damping": c.damping} for c in extremes(problem.told_gains, FEW)
     ]
     powers = [
         mean_credit(loop.driven(gains=gains), loop.n, noise.variance, lasting) / problem.period
