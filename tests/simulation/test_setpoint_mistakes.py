@@ -182,3 +182,16 @@ def test_no_text_breaks_the_reader(text: str) -> None:
         said = "nothing"
     assert said
     assert "\n" not in said
+
+
+@pytest.mark.parametrize(("rows", "number"), [(45_000, "{!r}"), (100_000, "{:.6g}")])
+def test_as_many_rows_as_the_documentation_says_are_kept_and_hardly_more(rows: int, number: str) -> None:
+    """Of random numbers, which no packing makes much smaller."""
+    rng = np.random.default_rng(0)
+    lines = [
+        ",".join(map(number.format, (k / 1000, *row)))
+        for k, row in enumerate(rng.normal(size=(rows, 6)).tolist())
+    ]
+    assert packed("\n".join(lines)).startswith(PACKED)
+    with pytest.raises(UnreadableError, match=r"at most 3\.5 MB can be kept"):
+        packed("\n".join([*lines, *lines[: rows // 10]]))

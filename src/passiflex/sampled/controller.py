@@ -103,7 +103,8 @@ class SampledController:
         granted = self._grant(read, force, setpoint, p)
         command, valve = self._command(read, force, granted, setpoint, p)
         variable = self._potential(force.now, granted.pose, granted.stiffness - p.gains.stiffness)
-        values = period_after(read, force, granted, command, variable, p.tank.tank_floor, s)
+        asked, floor = setpoint.pose.position, p.tank.tank_floor
+        values = period_after(read, force, granted, asked, command, variable, floor, s)
         own = Layout(self.state.fields[: len(values)])
         after = cs.vertcat(own.stack(values), read.observed, read.seen)
         faulty = self.state.stack(vars(s) | {"faults": s.faults + 1, "lost_time": read.elapsed})

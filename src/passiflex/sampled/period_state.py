@@ -46,6 +46,7 @@ def period_state(n: int, k: int) -> Layout:
             Field("rebased_energy", (), "J", "given to T by S when the law fell back"),
             Field("lowest_level", (), "J", "least T so far"),
             Field("governed_time", (), "s", "in which the reference was held back"),
+            Field("largest_lag", (), "m", "largest |x_d − x̂_d| so far, of all periods"),
             Field("faults", (), "1", "periods with a measurement that was not finite"),
             Field(
                 "lost_time",
@@ -73,9 +74,9 @@ def period_start(n: int, k: int, at: Rest) -> Remembered:
 
 
 def period_after(
-    r: Read, f: Force, granted: Granted, command: Command, variable: cs.SX, floor: cs.SX, s: Any
+    r: Read, f: Force, granted: Granted, asked: cs.SX, command: Command, variable: cs.SX, floor: cs.SX, s: Any
 ) -> dict[str, cs.SX]:
-    """Return their values after a period; `variable` is U(K_x) − U(K_base), `floor` that of the tank."""
+    """Return their values after a period; `asked` is x_d, `variable` U(K_x) − U(K_base), `floor` that of the tank."""
     tank = added(f.tank, granted.entry)
     held_back = cs.logic_or(granted.pose_share < 1, granted.stiffness_share < 1)
     is_sure = cs.logic_or(r.first, f.lowest - r.bound.total >= floor)
@@ -102,6 +103,7 @@ def period_after(
         "rebased_energy": s.rebased_energy + f.rebased,
         "lowest_level": cs.fmin(s.lowest_level, cs.fmin(f.lowest, tank.level)),
         "governed_time": s.governed_time + cs.if_else(held_back, r.elapsed, 0),
+        "largest_lag": cs.fmax(s.largest_lag, cs.norm_2(asked - granted.pose.position)),
         "faults": s.faults + cs.fmin(tank.fault, 1),
         "lost_time": 0,
         **r.bound.state,
