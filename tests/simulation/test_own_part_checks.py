@@ -50,7 +50,10 @@ def pushing(**effect: Any) -> AbstractElement:
         (pushing(stored=1.0), "needs stores = True"),
         (element(lambda self, at, s, m: None), "Odd.act fails; got TypeError"),
         (element(lambda self, at, s, m: at.own.depth), "Odd.act fails.*no 'depth'; there are none"),
-        (element(lambda self, at, s, m: nothing(1), port="tip"), "Odd.port; got 'tip'; needs 'motors', 'links' or"),
+        (
+            element(lambda self, at, s, m: nothing(1), port="tip"),
+            "Odd.port; got 'tip'; needs 'motors', 'links' or",
+        ),
         (element(lambda self, at, s, m: nothing(1), name="my wall"), "Odd.name; got 'my wall'"),
     ],
 )
