@@ -63,7 +63,8 @@ def _of(run: Run, name: str, label: str, role: str, values: Callable[[Run, str],
 
 def _force(run: Run, name: str) -> Array:
     """Return the size of the force [N]."""
-    size: Array = np.linalg.norm(run[f"{name}_force"], axis=1)
+    with np.errstate(over="ignore"):  # of a strange file
+        size: Array = np.linalg.norm(run[f"{name}_force"], axis=1)
     return size
 
 
