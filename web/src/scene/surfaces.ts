@@ -5,6 +5,7 @@ import type { Surface } from "../data.ts";
 import type { Touch } from "../motion.ts";
 import { shown } from "../numbers.ts";
 import type { Body } from "../report.ts";
+import { largestNorm } from "../sampling.ts";
 import type { Look } from "../theme.ts";
 import { lines } from "./floor.ts";
 import { Arrow, Ball } from "./markers.ts";
@@ -69,7 +70,9 @@ export class SurfaceView {
   constructor(surface: Surface, reach: number, largest: number, tag: Tag) {
     [this.#surface, this.#largest, this.tag] = [surface, largest, tag];
     const { body, name } = surface;
-    this.label = `${name}${body && body.kind !== name ? `, ${body.kind}` : ""}${largest > 0 ? ` (longest arrow ${shown(largest, 3)} N)` : ""}`;
+    const kind = body && body.kind !== name ? `, ${body.kind}` : "";
+    const scale = largestNorm(surface.force) > 0 ? ` (longest arrow ${shown(largest, 3)} N)` : "";
+    this.label = `${name}${kind}${scale}`;
     this.group.add(this.arrow.group, this.mark.object);
     if (!body) return;
     const frame = new Group();
