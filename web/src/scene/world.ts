@@ -140,7 +140,7 @@ export class World {
     const { surfaces, frames } = this.#report;
     const largest = Math.max(largestNorm(frames.force), this.#strongest());
     for (const surface of surfaces) {
-      const view = new SurfaceView(surface, reach, largest, this.#stage.tag("force"));
+      const view = new SurfaceView(surface, reach, largest, this.#stage.tag("force contact"));
       this.#touchables.push(view);
       this.#forces.push(view);
       this.#stage.scene.add(view.group);
