@@ -137,6 +137,12 @@ def test_plot_writes_what_the_name_says(shell: Shell, saved: Path, tmp_path: Pat
     assert out.read_bytes().startswith(BEGINNINGS[ending])
 
 
+def test_plot_of_contacts_says_that_there_are_none(shell: Shell, saved: Path) -> None:
+    result = shell("plot", saved, "--kind", "contact")
+    assert result.status != 0
+    assert "has no signals to draw for contact" in result.err
+
+
 def test_plot_of_another_kind(shell: Shell, saved: Path) -> None:
     result = shell("plot", saved, "--kind", "power")
     assert result.status != 0

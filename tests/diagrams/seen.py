@@ -11,6 +11,7 @@ import numpy as np
 import xarray as xr
 import yaml
 
+from passiflex.diagrams import KINDS
 from passiflex.simulation import Run, parse_scenario, simulate
 
 ARM = Path(__file__).parents[2] / "docs" / "examples" / "arm3.yaml"
@@ -46,6 +47,15 @@ RIGID = {
 }
 CONTROL = {"rate": 1000, "delay": 0, "inner_loop": "plain", "external_torque": "none"}
 DRAG = [{"from": 0.5, "to": 1, "viscous": 30}]
+WALL = {
+    "kind": "plane",
+    "name": "wall",
+    "point": [0, 0, 0.03],
+    "normal": [0, 0, -1],
+    "relative": True,
+    "stiffness": 1e3,
+}
+_PLAIN = PUSHED["law"] | {"shaped_stiffness": {"ratio": 1}}
 POOR = {"kind": "port", "initial": 0.13}
 
 
@@ -67,12 +77,18 @@ def rigid() -> Run:
     return simulated(law=RIGID)
 
 
+def touching() -> Run:
+    """Return a sampled run whose hand comes to a wall that is above where it starts."""
+    return simulated(law=_PLAIN, control=CONTROL, environment=[WALL], output_interval=0.001)
+
+
 def held_back() -> Run:
     """Return a sampled run whose tank cannot pay for the step at once."""
-    law = PUSHED["law"] | {"shaped_stiffness": {"ratio": 1}}
-    return simulated(law=law, control=CONTROL, tank=POOR, drags=DRAG, output_interval=0.001)
+    return simulated(law=_PLAIN, control=CONTROL, tank=POOR, drags=DRAG, output_interval=0.001)
 
 
+EVERYWHERE = tuple(kind for kind in KINDS if kind != "contact")
+"""Kinds of diagrams that there are of every run."""
 KINDS_OF_RUN = {"continuous": continuous, "rigid": rigid, "sampled": held_back}
 
 

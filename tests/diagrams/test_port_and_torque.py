@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from diagrams.seen import KINDS_OF_RUN, altered, continuous, held_back, made_up, rigid, without
+from diagrams.seen import EVERYWHERE, KINDS_OF_RUN, altered, continuous, held_back, made_up, rigid, without
 from passiflex.diagrams import KINDS, Panel, Viewed, panels
 from passiflex.errors import NameUnknownError
 from passiflex.runs.run_arm import chain_of
@@ -26,15 +26,15 @@ def by_role(panel: Panel) -> dict[str, np.ndarray]:
 
 
 def test_another_kind_is_refused_with_the_names_of_the_kinds() -> None:
-    assert KINDS == ("energy", "port", "tracking", "torque")
+    assert KINDS == ("energy", "port", "tracking", "torque", "contact")
     with pytest.raises(NameUnknownError) as error:
         panels("torqe", Viewed(made_up(), "it"))
     assert str(error.value) == (
-        "unknown kind of diagram; got 'torqe'; needs one of energy, port, torque, tracking; try 'torque'"
+        "unknown kind of diagram; got 'torqe'; needs one of contact, energy, port, torque, tracking; try 'torque'"
     )
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", EVERYWHERE)
 @pytest.mark.parametrize("of", KINDS_OF_RUN)
 def test_every_diagram_says_what_it_is_of(kind: str, of: str) -> None:
     found = panels(kind, Viewed(KINDS_OF_RUN[of](), "it"))
@@ -57,7 +57,7 @@ UNITS = {
 }
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", EVERYWHERE)
 def test_every_diagram_has_the_unit_of_its_numbers(kind: str) -> None:
     powers = {f"{name}_power": ("time", np.ones(40)) for name in ("reference", "drawn", "spilled")}
     run = made_up(joints=1)

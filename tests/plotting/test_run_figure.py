@@ -14,8 +14,8 @@ from matplotlib.collections import PolyCollection
 from matplotlib.colors import same_color, to_hex
 from matplotlib.figure import Figure
 
-from diagrams.seen import altered, continuous, held_back, made_up, rigid, without
-from passiflex.diagrams import KINDS, Viewed, panels
+from diagrams.seen import EVERYWHERE, altered, continuous, held_back, made_up, rigid, without
+from passiflex.diagrams import Viewed, panels
 from passiflex.errors import NameUnknownError, RunFileError
 from passiflex.plotting.files import save_as
 from passiflex.plotting.run import ROWS_OF_EVENTS, SLIDE_HEIGHT, draw_run, printed
@@ -49,7 +49,7 @@ def texts(axes: Axes) -> list[str]:
 
 
 @pytest.mark.parametrize("size", SIZES)
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", EVERYWHERE)
 def test_every_curve_is_drawn_as_it_is_in_its_own_look(kind: str, size: str) -> None:
     figure = draw_run(kind, ONE, OTHERS, size)
     found = panels(kind, ONE, OTHERS)
@@ -133,7 +133,7 @@ def test_levels_near_the_curves_are_lines_and_those_far_away_are_named() -> None
 
 
 @pytest.mark.parametrize("size", SIZES)
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", EVERYWHERE)
 @pytest.mark.parametrize("one", [ONE, Viewed(made_up(), "it")], ids=["real", "made up"])
 def test_no_text_lies_over_another(one: Viewed, kind: str, size: str) -> None:
     """Labels of axes, names of levels and events, and the legend; for three joints and for seven."""
@@ -179,7 +179,7 @@ def test_a_label_is_shown_as_the_text_that_it_is(label: str, tmp_path: Path) -> 
 
 def test_one_row_can_be_drawn() -> None:
     row = Run(made_up().data.isel(time=[0]))
-    for kind in KINDS:
+    for kind in EVERYWHERE:
         draw_run(kind, Viewed(row, "it")).canvas.draw()
 
 

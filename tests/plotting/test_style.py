@@ -10,7 +10,7 @@ import matplotlib as mpl
 import pytest
 from matplotlib.colors import same_color
 
-from diagrams.seen import continuous, held_back, made_up, rigid
+from diagrams.seen import continuous, held_back, made_up, rigid, touching
 from passiflex.diagrams import KINDS, Viewed, panels
 from passiflex.errors import NameUnknownError
 from passiflex.plotting.style import (
@@ -43,7 +43,7 @@ PAPER = (
 def together() -> Iterator[tuple[str, ...]]:
     """Yield the roles of every diagram of every kind of run, four runs compared, and those of the paper's figures."""
     yield from PAPER
-    runs = (continuous(), rigid(), held_back(), made_up(joints=8))
+    runs = (continuous(), rigid(), held_back(), made_up(joints=8), touching())
     others = tuple(Viewed(run, str(i)) for i, run in enumerate((rigid(), *runs)))
     for run in runs:
         ideal = run["position"]

@@ -11,9 +11,9 @@ from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from diagrams.seen import held_back, made_up
+from diagrams.seen import EVERYWHERE, held_back, made_up, touching
 from passiflex.campaigns.page import Scatter
-from passiflex.diagrams import KINDS, Viewed
+from passiflex.diagrams import Viewed
 from passiflex.plotting.campaign import draw_campaign
 from passiflex.plotting.figures import CircleColumn, Series, StepColumn, draw_circle, draw_steps
 from passiflex.plotting.limits import draw_limits
@@ -72,10 +72,11 @@ FIGURES: dict[str, Callable[[], Figure]] = {
     "uncertainty": lambda: draw_uncertainty(
         [column("a", falls_back=True), column("b", falls_back=False)], ""
     ),
-    **{f"{kind}": lambda kind=kind: draw_run(kind, Viewed(held_back(), "it")) for kind in KINDS},  # type: ignore[misc]
+    "contact": lambda: draw_run("contact", Viewed(touching(), "it")),
+    **{f"{kind}": lambda kind=kind: draw_run(kind, Viewed(held_back(), "it")) for kind in EVERYWHERE},  # type: ignore[misc]
     **{
         f"{kind} on a slide": lambda kind=kind: draw_run(kind, Viewed(made_up(), "it"), (), "slide")  # type: ignore[misc]
-        for kind in KINDS
+        for kind in EVERYWHERE
     },
 }
 

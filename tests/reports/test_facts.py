@@ -72,6 +72,22 @@ def told(**changes: Any) -> dict[str, str]:
             "noise of τ_a",
             "variance 0.2 (N m)², each value held for 2 s",
         ),
+        (
+            {"environment": [{"kind": "load", "from": 0.1, "to": 0.4, "mass": 1.5}]},
+            "load",
+            "1.5 kg, grip 20000 N/m, the law does not know it, 0.1 to 0.4 s",
+        ),
+        (
+            {"environment": [{"kind": "person", "name": "anna", "from": 0.1, "to": 0.4}]},
+            "person anna",
+            "2 kg, grip 5000 N/m, arm 300 N/m, 0.1 to 0.4 s",
+        ),
+        ({"environment": [{"kind": "end_stops", "stiffness": 3e4}]}, "end stops", "30000 N m/rad"),
+        (
+            {"environment": [{"kind": "drag", "from": 0.1, "to": 0.4, "viscous": 3, "dry": 2}]},
+            "drag",
+            "3 N s/m, 2 N, 0.1 to 0.4 s",
+        ),
         ({"deviations": {"joint_stiffness": 0.2}}, "robot is off by", "joint stiffness +20 %"),
         (
             {"model_errors": {"joint_damping": -0.5, "motor_inertia": [0.1, 0.2]}},

@@ -27,6 +27,7 @@ from reports.browser import (
     number,
     started,
 )
+from reports.surfaces import MISTOLD, touching
 
 EXAMPLES = Path(__file__).parents[2] / "docs" / "examples"
 HOSTILE = "<img src=x onerror=window.hacked=1>"
@@ -387,6 +388,58 @@ def test_the_deflection_is_drawn_magnified_and_told_as_it_is(report: Report, iiw
     told = [number(text) for text in report.page.locator(".magnifier tbody td:last-child").all_inner_texts()]
     np.testing.assert_allclose(told, 1000 * deflection, atol=6e-4)
     report.keep("magnified")
+
+
+# --- what it touches --------------------------------------------------------------------------------
+
+
+def test_what_touches_the_arm_is_in_the_scene_with_its_force(opened: Callable[..., Report]) -> None:
+    run = touching()
+    report = opened(run, scheme="dark")
+    start, pressed = run["position"][0], np.linalg.norm(run["wall_force"], axis=1)
+    report.at(0.0)
+    apart = report.scene()
+    by_name = {drawn["name"]: drawn for drawn in report.call("surfaces")}
+    assert list(by_name) == ["wall", "ball", "post", "crate"]
+    np.testing.assert_allclose(by_name["wall"]["at"], start + np.array([0.05, 0, 0]), atol=1e-6)
+    assert all(drawn["force"] is None for drawn in by_name.values())
+    assert "no contact" in report.page.locator("footer").inner_text()
+    row = int(pressed.argmax()) // 5 * 5
+    report.at(run.time[row])
+    wall, ball, *_ = report.call("surfaces")
+    np.testing.assert_allclose(wall["force"], run["wall_force"][row], rtol=1e-6)
+    np.testing.assert_allclose(ball["at"], run["ball_place"][row], atol=1e-6)
+    assert f"wall {pressed[row]:.3g} N" in report.page.locator(".tag.force").all_inner_texts()
+    assert f"contact {pressed[row]:.3g} N" in report.page.locator("footer").inner_text()
+    assert "wall, plane (longest arrow" in report.page.locator(".layers").inner_text()
+    assert np.any(report.scene() != apart)
+    assert report.call("value", "contact", "force", "wall") == pytest.approx(pressed[row], rel=1e-6)
+    report.keep("contact")
+    report.page.keyboard.press("2")
+    report.drawn()
+    report.keep("contact-close")
+    assert (report.errors, report.requests) == ([], [])
+
+
+def test_surfaces_can_be_taken_away(opened: Callable[..., Report]) -> None:
+    report = opened(touching())
+    before = report.pixels(report.rectangle(CANVAS))
+    report.page.locator(".layers label", has_text="wall").locator("input").uncheck()
+    report.drawn()
+    assert report.call("surfaces")[0]["at"] is None
+    assert np.any(report.pixels(report.rectangle(CANVAS)) != before, axis=2).sum() > 1000
+    assert report.errors == []
+
+
+@pytest.mark.parametrize("damage", MISTOLD)
+def test_surfaces_of_strange_files_do_no_harm(opened: Callable[..., Report], damage: str) -> None:
+    run = MISTOLD[damage]()
+    report = opened(run)
+    report.at(run.time[-1] / 2)
+    assert report.page.evaluate("() => window.hacked") is None
+    assert report.page.locator("img").count() == 0
+    assert colours(report.scene()) > 20
+    assert (report.errors, report.requests) == ([], [])
 
 
 # --- everywhere, and with any run ------------------------------------------------------------------

@@ -4,6 +4,7 @@ import type { Report } from "./data.ts";
 import type { Window } from "./plots/window.ts";
 import type { Header } from "./report.ts";
 import { readAt } from "./sampling.ts";
+import type { Drawn } from "./scene/surfaces.ts";
 import type { SceneView } from "./scene/view.ts";
 import type { Timeline } from "./timeline.ts";
 
@@ -27,6 +28,8 @@ export interface Api {
   tipOnScreen: () => { x: number; y: number } | null;
   /** Set the magnification of the joint deflection if one is given; the present one. */
   magnify: (factor?: number) => number;
+  /** The surfaces in the scene; empty without WebGL. */
+  surfaces: () => Drawn[];
   /** Joint positions as drawn [rad or m]: of the links, and of the motors with the magnified deflection. */
   drawn: () => { q: number[]; motor: number[] };
 }
@@ -62,6 +65,7 @@ export function makeApi(report: Report, timeline: Timeline, shown: Window, scene
       if (factor !== undefined) scene.factor = factor;
       return scene.factor;
     },
+    surfaces: () => scene.surfaces,
     drawn: () => scene.drawn,
   };
 }

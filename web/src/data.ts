@@ -1,6 +1,6 @@
 /** From the text of the page to arrays: base64, gzip, byte shuffle. */
 
-import type { ArrayRef, CurveRef, Header, PanelHeader } from "./report.ts";
+import type { ArrayRef, Body, CurveRef, Header, PanelHeader } from "./report.ts";
 
 export type Numbers = Float32Array | Float64Array;
 
@@ -29,6 +29,16 @@ export interface Ghost {
   position: Table;
 }
 
+/** What may touch the hand: shift [m], force on the hand [N] and depth [m] at the frames. */
+export interface Surface {
+  name: string;
+  role: string;
+  body: Body | null;
+  shift: Table | null;
+  force: Table;
+  depth: Table;
+}
+
 /** The motion on one time grid: angles [rad] (prismatic: m), positions [m], force [N], moment [N m]. */
 export interface Frames {
   time: Numbers;
@@ -45,6 +55,7 @@ export interface Report {
   header: Header;
   frames: Frames;
   ghosts: Ghost[];
+  surfaces: Surface[];
   panels: Panel[];
 }
 
@@ -110,6 +121,7 @@ export function opened(header: Header, blob: ArrayBuffer): Report {
       moment: maybe(frames.moment),
     },
     ghosts: header.ghosts.map((ghost) => ({ ...ghost, q: maybe(ghost.q), position: table(ghost.position) })),
+    surfaces: header.surfaces.map((surface) => ({ ...surface, shift: maybe(surface.shift), force: table(surface.force), depth: table(surface.depth) })),
     panels: header.panels.map((panel) => ({
       ...panel,
       curves: panel.curves.map((curve) => ({ ...curve, x: times[curve.time]!, y: unshuffled(blob, curve.values) })),

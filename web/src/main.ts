@@ -7,6 +7,7 @@ import { complain, watchErrors } from "./failure.ts";
 import { makeHead } from "./head/head.ts";
 import { listenToKeys } from "./keys.ts";
 import { tipError } from "./kinematics.ts";
+import { contactForce } from "./motion.ts";
 import { Plots } from "./plots/group.ts";
 import { SceneView } from "./scene/view.ts";
 import { Theme } from "./theme.ts";
@@ -57,10 +58,11 @@ async function start(): Promise<void> {
       header.notices.push(`The drawn arm misses the recorded end effector by up to ${(1000 * error).toPrecision(3)} mm: trust the curves, not the picture.`);
     }
   }
+  const contact = report.surfaces.length > 0 ? (t: number) => contactForce(report.surfaces, frames, t) : null;
   const head = makeHead(report, theme, goWorst);
   const scene = new SceneView(report, theme, timeline);
   const plots = new Plots(report.panels, theme, timeline);
-  place.replaceChildren(head.element, el("main", {}, scene.element, plots.element), makeTransport(header, timeline, goWorst));
+  place.replaceChildren(head.element, el("main", {}, scene.element, plots.element), makeTransport(header, timeline, contact, goWorst));
   scene.start();
   plots.draw();
   listenToKeys(timeline, {

@@ -1,6 +1,6 @@
 /** The run at one time: joint positions, frames, points and the force on the end effector. */
 
-import type { Frames } from "./data.ts";
+import type { Frames, Surface } from "./data.ts";
 import { forward, type Posture } from "./kinematics.ts";
 import type { Arm } from "./report.ts";
 import { placeOf, valuesAt, type Place } from "./sampling.ts";
@@ -39,6 +39,36 @@ export function momentAt(arm: Arm | null, frames: Frames, t: number): Moment {
     force: frames.force && valuesAt(frames.force, held),
     moment: frames.moment && valuesAt(frames.moment, held),
   };
+}
+
+/** What a surface does to the hand. */
+export interface Touch {
+  /** [N], on the hand. */
+  force: number[];
+  /** Whether the hand is in it. */
+  pressed: boolean;
+  /** How far it has moved [m]; null for one that stays. */
+  shift: number[] | null;
+}
+
+/** A surface at a place of the run. */
+export function touchAt(surface: Surface, place: Place): Touch {
+  // An impact is there or not, as a push.
+  const held = { row: place.row, share: 0 };
+  const force = valuesAt(surface.force, held);
+  return {
+    force,
+    pressed: valuesAt(surface.depth, held)[0]! > 0 && force.every(Number.isFinite),
+    shift: surface.shift && valuesAt(surface.shift, place),
+  };
+}
+
+/** Size of the force of all surfaces together at time t [N]; null where nothing is touched. */
+export function contactForce(surfaces: Surface[], frames: Frames, t: number): number | null {
+  const place = placeOf(frames.time, t);
+  const touches = surfaces.map((surface) => touchAt(surface, place)).filter((touch) => touch.pressed);
+  if (touches.length === 0) return null;
+  return Math.hypot(...[0, 1, 2].map((i) => touches.reduce((sum, { force }) => sum + force[i]!, 0)));
 }
 
 /** What the magnified motor position is in the picture: q + factor (theta - q). */

@@ -72,6 +72,28 @@ export interface Arm {
   solids: Solid[][];
 }
 
+/** What a surface looks like, where it is at first. */
+export interface Body {
+  kind: "plane" | "sphere" | "cylinder" | "box";
+  /** [m]: of a plane the point next to where the hand starts. */
+  place: number[];
+  /** Its axes (9, row-major): z is out of a plane, and along a cylinder. */
+  rotation: number[];
+  /** [m]: of a plane none; the radius; radius and length, null where it has no end; three edges. */
+  sizes: (number | null)[];
+}
+
+export interface SurfaceRef {
+  name: string;
+  role: string;
+  /** null where the file does not say it, or it is too large to be drawn. */
+  body: Body | null;
+  /** How far it has moved; null for one that stays. */
+  shift: ArrayRef | null;
+  force: ArrayRef;
+  depth: ArrayRef;
+}
+
 export interface CurveRef {
   label: string;
   role: string;
@@ -123,6 +145,7 @@ export interface Header {
     moment: ArrayRef | null;
   };
   ghosts: { label: string; kind: "run" | "ideal"; role: string; q: ArrayRef | null; position: ArrayRef }[];
+  surfaces: SurfaceRef[];
   panels: PanelHeader[];
   times: ArrayRef[];
   styles: Record<string, RoleStyle>;

@@ -1,16 +1,17 @@
 /** The foot of the page: play, speed, and the time with the marks of the run on it. */
 
 import { button, el, say } from "./dom.ts";
-import { clock } from "./numbers.ts";
+import { clock, shown } from "./numbers.ts";
 import type { Header } from "./report.ts";
 import { SPEEDS, type Timeline } from "./timeline.ts";
 
-export function makeTransport(header: Header, timeline: Timeline, goWorst: () => void): HTMLElement {
+export function makeTransport(header: Header, timeline: Timeline, contact: ((t: number) => number | null) | null, goWorst: () => void): HTMLElement {
   const play = button("▶", "play (space)", () => timeline.toggle(), "play");
   const speed = el("select", { class: "speed", "aria-label": "speed" });
   for (const value of SPEEDS) speed.append(el("option", { value }, `${value}×`));
   speed.addEventListener("change", () => timeline.setSpeed(Number(speed.value)));
   const time = el("output", { class: "now" });
+  const felt = contact && el("output", { class: "felt", title: "force of what the hand touches" });
   const slider = el("input", { type: "range", class: "time", min: timeline.start, max: timeline.end, step: "any", "aria-label": "time of the run [s]" });
   slider.addEventListener("input", () => timeline.seek(Number(slider.value)));
   const span = Math.max(timeline.end - timeline.start, 1e-9);
@@ -38,6 +39,9 @@ export function makeTransport(header: Header, timeline: Timeline, goWorst: () =>
     slider.value = String(t);
     slider.setAttribute("aria-valuetext", `${clock(t)} seconds`);
     say(time, `${clock(t)} s`);
+    if (!felt) return;
+    const force = contact(t);
+    say(felt, force === null ? "no contact" : `contact ${shown(force, 3)} N`);
   };
   const change = () => {
     say(play, timeline.playing ? "❚❚" : "▶");
@@ -58,6 +62,7 @@ export function makeTransport(header: Header, timeline: Timeline, goWorst: () =>
     play,
     speed,
     time,
+    felt,
     el("div", { class: "rail" }, track, slider),
     el("span", { class: "total" }, `of ${clock(timeline.end)} s`),
     jumps(header, timeline, worst === null ? null : goWorst),

@@ -27,6 +27,7 @@ export function headerOf(): Header {
     arm: null,
     frames: { time: none, q: none, theta: none, position: none, reference: null, governed: null, force: null, moment: null },
     ghosts: [],
+    surfaces: [],
     panels: [],
     times: [],
     styles: {},
@@ -45,6 +46,7 @@ export function reportOf(): Report {
     header: headerOf(),
     frames: { time: Float64Array.of(0, 1), q: table([[0], [0.5]]), theta: table([[0], [0.25]]), position: still, reference: null, governed: null, force: null, moment: null },
     ghosts: [],
+    surfaces: [],
     panels: [
       {
         kind: "energy",

@@ -57,7 +57,8 @@ def plot(
     /,
     *,
     kind: Annotated[
-        Literal["energy", "tracking", "torque", "port"], cyclopts.Parameter(help="what to draw over time")
+        Literal["energy", "tracking", "torque", "port", "contact"],
+        cyclopts.Parameter(help="what to draw over time"),
     ],
     compare: Compared = (),
     size: Annotated[
@@ -68,7 +69,7 @@ def plot(
         Path | None, cyclopts.Parameter(help="file that ends in .png, .pdf or .svg; without it RUN_KIND.png")
     ] = None,
 ) -> int:
-    """Draw the energies, the tracking, the torques or the powers at the ports of a run."""
+    """Draw the energies, the tracking, the torques, the powers at the ports or the contacts of a run."""
     from passiflex.diagrams import viewed
     from passiflex.plotting.figures import save_as
     from passiflex.plotting.run import draw_run

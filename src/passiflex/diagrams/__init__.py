@@ -1,5 +1,7 @@
 """What there is to look at in a run: diagrams of its signals over time, with the events that explain them."""
 
+from passiflex.diagrams.contact import surface_role as surface_role
+from passiflex.diagrams.contact import touched as touched
 from passiflex.diagrams.events import marks_of as marks_of
 from passiflex.diagrams.events import spans_of as spans_of
 from passiflex.diagrams.ideal import ideal_motion as ideal_motion

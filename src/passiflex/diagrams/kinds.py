@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
+from passiflex.diagrams.contact import contact_panels
 from passiflex.diagrams.energy import energy_panels
 from passiflex.diagrams.panel import Panel
 from passiflex.diagrams.port import port_panels
@@ -17,6 +18,7 @@ VIEWS: dict[str, Callable[[Viewed, Sequence[Viewed]], tuple[Panel, ...]]] = {
     "port": port_panels,
     "tracking": tracking_panels,
     "torque": torque_panels,
+    "contact": contact_panels,
 }
 KINDS = tuple(VIEWS)
 

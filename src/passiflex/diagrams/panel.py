@@ -49,7 +49,7 @@ class Panel:
 
     Attributes
     ----------
-    kind: What it is about: energy, port, tracking or torque.
+    kind: What it is about: energy, port, tracking, torque or contact.
     choice: Which of several diagrams of that kind; they take turns in one place.
     title, unit: Of the vertical axis; every curve has this unit.
     """

@@ -17,7 +17,7 @@ from passiflex.extras import imported
 from passiflex.passivity import audit_if_possible
 from passiflex.runs.run import Run
 
-OPENED = {"energy": "energies", "port": "powers", "tracking": "z", "torque": "all joints"}
+OPENED = {"energy": "energies", "port": "powers", "tracking": "z", "torque": "all joints", "contact": "force"}
 """Kind of diagram → the choice of it that a viewer opens; the first one where a run has no such choice."""
 PROPERTIES = ("name", "robot", "law", "seed", "control_period", "duration", "version", "commit", "failure")
 

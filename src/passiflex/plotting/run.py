@@ -50,7 +50,7 @@ class Place(NamedTuple):
 
 
 def draw_run(kind: str, viewed: Viewed, others: Sequence[Viewed] = (), size: str = "double") -> Figure:
-    """Return the figure of a run: energy, port, tracking or torque, at a named size.
+    """Return the figure of a run: energy, port, tracking, torque or contact, at a named size.
 
     Parameters
     ----------

@@ -34,6 +34,20 @@ def _joints() -> dict[str, Role]:
     }
 
 
+def _surfaces() -> dict[str, Role]:
+    """Return what touches the hand."""
+    looks = (
+        ("#8a5a00", "#f0c040", ()),
+        ("#0072b2", "#4aa8ec", DASHED),
+        ("#9c3f78", "#ffc4ec", DASH_DOT),
+        ("#00795a", "#2fd0a0", DOTTED),
+    )
+    return {
+        f"surface {i}": Role(light, dark, 1.2, dash, f"surface {i}")
+        for i, (light, dark, dash) in enumerate(looks, start=1)
+    }
+
+
 def _others() -> dict[str, Role]:
     """Return compared runs, each with a second line for its total energy."""
     looks = (
@@ -85,6 +99,7 @@ ROLES: dict[str, Role] = {
     "drawn": Role(*PAPER_MAGENTA, 1.2, DASH_DOT, "drawn from the tank"),
     "spilled": Role("#a87400", "#f0c040", 1.0, DASHED, "past the tank"),
     **_joints(),
+    **_surfaces(),
     **_others(),
     # verdicts, told apart by shape as well, and signs
     "passive": Role("#0072b2", "#4aa8ec", 1.0, (), "passive"),

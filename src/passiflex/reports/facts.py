@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 import yaml
 
+from passiflex.reports.surroundings import surroundings
 from passiflex.sampled.tanks import TANKS
 from passiflex.scenarios.gain_settings import (
     Damping,
@@ -45,6 +46,7 @@ def facts(run: Run, scenario: Scenario | None) -> Facts:
         found.append(("control", _control(scenario)))
         found.append(("tank", _tank(scenario)))
         found += _world(scenario)
+        found += surroundings(scenario)
     found.append(("duration", _duration(run)))
     found += [("moved by", run.engine)] if run.moved_elsewhere else []
     found += [("limit passed", str(passed)) for passed in passed_limits(run)]

@@ -12,6 +12,7 @@ from passiflex.diagrams import Viewed
 from passiflex.diagrams.viewed import first_finite
 from passiflex.reports.arm import same_kinematics
 from passiflex.reports.arrays import Arrays
+from passiflex.reports.surfaces import drawn_surfaces, without_contact
 from passiflex.reports.thinning import frame_rows
 from passiflex.robots import SerialChain
 from passiflex.runs.run_arm import chain_of
@@ -31,16 +32,24 @@ def frames_header(run: Run, joints: int, arrays: Arrays) -> dict[str, Any]:
     def signal(name: str, size: int) -> Array:
         return run[name][rows] if name in run.data else np.full((rows.size, size), np.nan)
 
-    wrench = run["wrench"][rows] if "wrench" in run.data else None
+    force, moment = _rest(run, rows) if "wrench" in run.data else (None, None)
     return {
         "time": arrays.add(run.time[rows], "f64"),
         "q": arrays.add(signal("q", joints)),
         "theta": arrays.add(signal("theta", joints)),
         "position": arrays.add(signal("position", 3)),
         **{key: arrays.add(run[name][rows]) if name in run.data else None for key, name in OPTIONAL.items()},
-        "force": None if wrench is None else arrays.add(wrench[:, :3]),
-        "moment": None if wrench is None else arrays.add(wrench[:, 3:]),
+        "force": None if force is None else arrays.add(force),
+        "moment": None if moment is None else arrays.add(moment),
     }
+
+
+def _rest(run: Run, rows: NDArray[np.intp]) -> tuple[Array, Array | None]:
+    """Return force and moment; with surfaces the force beside theirs, and no moment: whose it is no run says."""
+    if drawn_surfaces(run):
+        return without_contact(run, rows), None
+    wrench = run["wrench"][rows]
+    return wrench[:, :3], wrench[:, 3:]
 
 
 def ghosts_header(

@@ -14,6 +14,7 @@ from passiflex.reports.diagrams import Diagrams, marks_header, spans_header
 from passiflex.reports.facts import facts, made_by, shown_configuration
 from passiflex.reports.frames import frames_header, ghosts_header
 from passiflex.reports.metrics import metrics_header, verdict_header
+from passiflex.reports.surfaces import surface_notices, surfaces_header
 from passiflex.runs.run_arm import chain_of
 from passiflex.simulation import Run
 
@@ -41,6 +42,8 @@ def content(run: Run, others: Sequence[Run | Viewed] = (), notices: Sequence[str
     said += [NO_VERDICT] if result is None else []
     ghosts = ghosts_header(main, compared, roles_of(main, compared)[1:], chain, arrays)
     said += [f"{g['label']} is shown without its arm: {ANOTHER}." for g in ghosts if _is_armless(g)]
+    surfaces = surfaces_header(run, arrays)
+    said += surface_notices(surfaces, run)
     found = [panel for kind in KINDS for panel in panels(kind, main, compared)]
     verdict = None if result is None else verdict_header(run, result)
     moments = [verdict[key] for key in ("time", "worst_time")] if verdict else []
@@ -60,6 +63,7 @@ def content(run: Run, others: Sequence[Run | Viewed] = (), notices: Sequence[str
         "arm": None if chain is None else arm_header(chain),
         "frames": frames_header(run, run.data.sizes.get("joint", 0), arrays),
         "ghosts": ghosts,
+        "surfaces": surfaces,
         "panels": [diagrams.header(panel) for panel in found],
         "times": diagrams.times,
         "styles": {role: _style(look) for role, look in ROLES.items()},

@@ -7,7 +7,7 @@ import type { Timeline } from "../timeline.ts";
 import { Slot } from "./slot.ts";
 import { Window } from "./window.ts";
 
-export const KINDS = ["energy", "port", "tracking", "torque"];
+export const KINDS = ["energy", "port", "tracking", "torque", "contact"];
 
 /** Least time between two writings of the values while the run plays [ms]: faster than this nobody reads. */
 const READING = 120;

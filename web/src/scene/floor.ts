@@ -12,7 +12,8 @@ export function spacing(half: number): number {
   return ([1, 2, 5].find((m) => m * decade >= raw * 0.999) ?? 10) * decade;
 }
 
-function lines(points: number[], material: LineBasicMaterial): LineSegments {
+/** Lines between each two of these points [m]. */
+export function lines(points: number[], material: LineBasicMaterial): LineSegments {
   const geometry = new BufferGeometry();
   geometry.setAttribute("position", new Float32BufferAttribute(points, 3));
   return new LineSegments(geometry, material);

@@ -9,6 +9,7 @@ import type { Timeline } from "../timeline.ts";
 import { layerList } from "./layers.ts";
 import { Magnifier } from "./magnifier.ts";
 import { Stage } from "./stage.ts";
+import type { Drawn } from "./surfaces.ts";
 import { look, pathExtent, sideOf, wholeExtent } from "./views.ts";
 import { World } from "./world.ts";
 
@@ -154,6 +155,11 @@ export class SceneView {
   /** Joint positions as drawn: links, and motors with their magnified deflection [rad or m]. */
   get drawn(): { q: number[]; motor: number[] } {
     return { q: [...this.#moment.q], motor: magnified(this.#moment, this.factor) };
+  }
+
+  /** The surfaces as they are in the scene. */
+  get surfaces(): Drawn[] {
+    return this.#world?.surfaces ?? [];
   }
 
   /** Bring the scene to the time of the timeline. */

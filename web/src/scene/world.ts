@@ -3,7 +3,7 @@
 import { Vector3 } from "three";
 import type { Report } from "../data.ts";
 import { forward } from "../kinematics.ts";
-import { magnified, type Moment } from "../motion.ts";
+import { magnified, touchAt, type Moment } from "../motion.ts";
 import { shown } from "../numbers.ts";
 import { largestNorm, valuesAt } from "../sampling.ts";
 import type { Theme } from "../theme.ts";
@@ -14,6 +14,7 @@ import { layerOf, type Layer } from "./layers.ts";
 import { Arrow, Ball, Marker } from "./markers.ts";
 import { Path } from "./paths.ts";
 import type { Stage, Tag } from "./stage.ts";
+import { SurfaceView, type Drawn } from "./surfaces.ts";
 import { pathExtent, wholeExtent } from "./views.ts";
 
 /** Sizes on the screen of things that keep theirs while one zooms [px]. */
@@ -29,13 +30,15 @@ export class World {
   #report: Report;
   #theme: Theme;
   #stage: Stage;
-  #force: { arrow: Arrow; tag: Tag } | null = null;
+  #forces: { arrow: Arrow; tag: Tag }[] = [];
+  #touchables: SurfaceView[] = [];
 
   constructor(report: Report, theme: Theme, stage: Stage) {
     [this.#report, this.#theme, this.#stage] = [report, theme, stage];
     const reach = wholeExtent(report.header.arm, report.frames).radius;
     this.#addArm(reach);
     this.#addPaths();
+    this.#addSurfaces(reach);
     this.#addForce();
     this.#addGhosts();
     this.#addFloor(reach);
@@ -112,16 +115,16 @@ export class World {
 
   #addForce(): void {
     const { force, moment: turning } = this.#report.frames;
-    const largest = largestNorm(force);
-    if (!force || !(largest > 1e-9)) return;
+    const largest = Math.max(largestNorm(force), this.#strongest());
+    if (!force || !(largestNorm(force) > 1e-9)) return;
     const turns = largestNorm(turning) > 1e-9;
     const arrow = new Arrow();
     const tag = this.#stage.tag("force");
     this.#stage.scene.add(arrow.group);
     this.#sized.push({ object: arrow.group, pixels: PIXELS.arrow });
-    this.#force = { arrow, tag };
+    this.#forces.push({ arrow, tag });
     const look = () => ({ ...this.#theme.look("environment"), color: this.#theme.css("--span-force"), width: 3, dash: [] });
-    const layer: Layer = { label: "external force", look, seen: true, set: (seen) => (arrow.group.visible = seen) };
+    const layer: Layer = { label: this.#report.surfaces.length > 0 ? "external force, other" : "external force", look, seen: true, set: (seen) => (arrow.group.visible = seen) };
     this.#add(layer, () => arrow.paint(look()), (moment) => {
       const f = moment.force!;
       const size = Math.hypot(...f);
@@ -130,6 +133,32 @@ export class World {
       const torque = turns ? `, ${shown(Math.hypot(...moment.moment!), 3)} N m` : "";
       tag.element.textContent = `${shown(size, 3)} N${torque}`;
     });
+  }
+
+  /** Bodies, and arrows of their forces; all arrows of the scene share one scale. */
+  #addSurfaces(reach: number): void {
+    const { surfaces, frames } = this.#report;
+    const largest = Math.max(largestNorm(frames.force), this.#strongest());
+    for (const surface of surfaces) {
+      const view = new SurfaceView(surface, reach, largest, this.#stage.tag("force contact"));
+      this.#touchables.push(view);
+      this.#forces.push(view);
+      this.#stage.scene.add(view.group);
+      this.#sized.push({ object: view.arrow.group, pixels: PIXELS.arrow }, { object: view.mark.object, pixels: PIXELS.ball });
+      const look = () => ({ ...this.#theme.look(surface.role), width: 4, dash: [] });
+      const layer: Layer = { label: view.label, look, seen: true, set: (seen) => view.show(seen) };
+      this.#add(layer, () => view.paint(look()), (moment) => view.move(touchAt(surface, moment.place), moment.tip));
+    }
+  }
+
+  /** Largest force of a surface [N]. */
+  #strongest(): number {
+    return Math.max(0, ...this.#report.surfaces.map(({ force }) => largestNorm(force)));
+  }
+
+  /** The surfaces as they are in the scene. */
+  get surfaces(): Drawn[] {
+    return this.#touchables.map((view) => view.drawn);
   }
 
   #addGhosts(): void {
@@ -192,8 +221,8 @@ export class World {
     for (const { object, pixels } of this.#sized) {
       object.scale.setScalar(Math.max(perPixel * pixels * object.position.distanceTo(camera.position), 1e-6));
     }
-    if (!this.#force) return;
-    const { arrow, tag } = this.#force;
-    tag.point.copy(arrow.reach).multiplyScalar(arrow.group.scale.x).add(arrow.group.position);
+    for (const { arrow, tag } of this.#forces) {
+      tag.point.copy(arrow.reach).multiplyScalar(arrow.group.scale.x).add(arrow.group.position);
+    }
   }
 }

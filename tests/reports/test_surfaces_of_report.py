@@ -1,0 +1,96 @@
+"""What touches the hand is on the page: body, place, force, and nothing that a browser could not draw."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from passiflex.reports.surfaces import LARGEST, MOST
+from reports.pages import page, sampled
+from reports.surfaces import MISTOLD, said, touching
+
+SHARP = {"rtol": 1e-6, "atol": 1e-7}
+
+
+def test_each_surface_has_its_body_and_where_it_is() -> None:
+    run = touching()
+    read = page(run)
+    wall, ball, post, crate = read.header["surfaces"]
+    start = run["position"][0]
+    assert [s["name"] for s in (wall, ball, post, crate)] == ["wall", "ball", "post", "crate"]
+    assert [s["body"]["kind"] for s in (wall, ball, post, crate)] == ["plane", "sphere", "cylinder", "box"]
+    assert [s["body"]["sizes"] for s in (wall, ball, post, crate)] == [
+        [],
+        [0.06],
+        [0.05, None],
+        [0.2, 0.3, 0.3],
+    ]
+    np.testing.assert_allclose(wall["body"]["place"], start + np.array([0.05, 0, 0]))
+    np.testing.assert_allclose(np.reshape(wall["body"]["rotation"], (3, 3))[:, 2], [-1, 0, 0], atol=1e-12)
+    np.testing.assert_allclose(ball["body"]["place"], start + np.array([-0.1, 0.1, 0.3]))
+    np.testing.assert_allclose(post["body"]["place"], [0.4, 0.5, 0])
+    assert (wall["shift"], post["shift"]) == (None, None)
+    moved = read.array(ball["shift"])
+    np.testing.assert_allclose(moved[[0, -1]], [[0, 0, 0], [0, 0, 0.1]], atol=1e-6)
+    assert all(s["role"] in read.header["styles"] for s in (wall, ball, post, crate))
+
+
+def test_a_plane_is_drawn_where_the_hand_is_next_to_it() -> None:
+    (wall, *_) = page(said(point=[0.8, 7, -9], relative=False)).header["surfaces"]
+    start = touching()["position"][0]
+    np.testing.assert_allclose(wall["body"]["place"], [0.8, start[1], start[2]], atol=1e-12)
+
+
+def test_force_and_depth_are_rows_of_the_run_and_the_rest_is_another_force() -> None:
+    run = touching()
+    read = page(run)
+    frames, wall = read.header["frames"], read.header["surfaces"][0]
+    rows = np.searchsorted(run.time, read.array(frames["time"]))
+    np.testing.assert_allclose(read.array(wall["force"]), run["wall_force"][rows], **SHARP)
+    np.testing.assert_allclose(read.array(wall["depth"]), run["wall_depth"][rows], **SHARP)
+    assert np.abs(run["wrench"][:, :3]).max() > 1
+    assert not read.array(frames["force"]).any()
+    assert frames["moment"] is None
+
+
+def test_a_run_without_surfaces_has_none() -> None:
+    assert page(sampled()).header["surfaces"] == []
+
+
+@pytest.mark.parametrize("damage", MISTOLD)
+def test_whatever_a_file_says_can_be_drawn(damage: str) -> None:
+    header = page(MISTOLD[damage]()).header
+    json.dumps(header, allow_nan=False)
+    assert 0 < len(header["surfaces"]) <= MOST
+    for surface in header["surfaces"]:
+        if surface["body"] is not None:
+            numbers = [*surface["body"]["place"], *(s for s in surface["body"]["sizes"] if s is not None)]
+            assert np.abs(numbers).max() <= LARGEST
+            axes = np.reshape(surface["body"]["rotation"], (3, 3))
+            np.testing.assert_allclose(axes @ axes.T, np.eye(3), atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("damage", "notice"),
+    [
+        ("far", "Not drawn, but felt: wall; too large, too far, or not described."),
+        (
+            "no scenario",
+            "Not drawn, but felt: wall, ball, post, crate; too large, too far, or not described.",
+        ),
+        ("many", "20 more surfaces are not drawn."),
+    ],
+)
+def test_what_is_not_drawn_is_told(damage: str, notice: str) -> None:
+    assert notice in page(MISTOLD[damage]()).header["notices"]
+
+
+def test_the_facts_say_what_is_in_the_environment() -> None:
+    facts = dict(map(tuple, page(touching()).header["facts"]))
+    assert facts["plane wall"] == "20000 N/m, friction 0.3"
+    assert facts["sphere ball"] == "radius 0.06 m, 20000 N/m, no friction, moved"
+    assert facts["cylinder post"] == "radius 0.05 m, endless, 20000 N/m, no friction"
+    assert facts["box crate"] == "0.2 × 0.3 × 0.3 m, 20000 N/m, no friction"
+    assert facts["hand"] == "radius 20 mm"
