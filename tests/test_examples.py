@@ -26,7 +26,7 @@ SAYS = {
     "own_element": r"\de-\d\d",
     "own_law": r"up by (4\.9|5\.0)\d cm of 5 cm; the run was passive",
     "own_sensor": r"passive 0\.\d+",
-    "policy_stream": r"(?s)in time: the hand is up to \d\.\d cm off, and the run was passive.*messages: .*the run was passive",
+    "policy_stream": r"(?s)in time: .* \d\.\d cm off, and the run was passive.*messages: .*was passive",
     "own_motion": r"passive 0\.0[67]",
 }
 """What of its answer can be known beforehand."""
