@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from passiflex.errors import ScenarioError
 from passiflex.scenarios.setpoint_rows import setpoint_rows
-from passiflex.simulation import load_scenario, parse_scenario
+from passiflex.simulation import load_scenario, parse_scenario, simulate
 from passiflex.texts.number_table import PACKED, packed, parsed, unpacked, written
 from passiflex.texts.text_file import UnreadableError
 from worlds import PLAIN, merged, planar_text, world
@@ -195,3 +195,25 @@ def test_as_many_rows_as_the_documentation_says_are_kept_and_hardly_more(rows: i
     assert packed("\n".join(lines)).startswith(PACKED)
     with pytest.raises(UnreadableError, match=r"at most 3\.5 MB can be kept"):
         packed("\n".join([*lines, *lines[: rows // 10]]))
+
+
+@pytest.mark.parametrize("among", [True, False])
+def test_a_run_does_not_open_the_table_that_its_scenario_names(tmp_path: Path, *, among: bool) -> None:
+    """Whoever made the run may have named any file of whoever looks at it; the rows of a run are in it."""
+    secret = tmp_path / "secret.csv"
+    secret.write_text("t,x,y,z\n0,0,0,0\n1,0.1,0,0\n", encoding="utf-8")
+    run = simulate(world(reference={"table": str(secret), "relative": True}))
+    assert run.scenario is not None
+    data = yaml.safe_load(str(run.data.attrs["scenario"]))
+    named = {"table": str(secret), "relative": True}
+    data["reference"] = (
+        [{"kind": "hold", "at": 0.1}, {"kind": "table", "at": 0.2, **named}] if among else named
+    )
+    text = yaml.safe_dump(data)
+    assert parse_scenario(text).reference
+    run.data.attrs["scenario"] = text
+    assert run.scenario is None
+    with pytest.raises(
+        ScenarioError, match=r"reference: the table .* is not opened; its rows are not here"
+    ):
+        parse_scenario(text, opens=False)

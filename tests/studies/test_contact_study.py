@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from matplotlib import pyplot as plt
 
 from passiflex.plotting.contact import Approach, draw_approaches
 from passiflex.simulation import resolve, simulate
@@ -57,4 +58,4 @@ def test_the_figure_has_a_column_for_each_speed() -> None:
     figure = draw_approaches(rows, "conditions")
     assert len(figure.axes) == 2 * len(SPEEDS) + 1
     assert [axes.get_title() for axes in figure.axes[:5:2]] == [f"{v:g} m/s" for v in SPEEDS]
-    figure.clear()
+    plt.close(figure)

@@ -11,8 +11,11 @@ from passiflex.scenarios.scenario_file import parse_scenario
 
 @lru_cache(maxsize=64)
 def scenario_of_text(text: str) -> Scenario | None:
-    """Return the scenario of a text; None if it is none."""
+    """Return the scenario of a text; None if it is none.
+
+    A file that it names is not opened: whoever made the run may have named any.
+    """
     try:
-        return parse_scenario(text, source="the run's scenario")
+        return parse_scenario(text, source="the run's scenario", opens=False)
     except ScenarioError:
         return None

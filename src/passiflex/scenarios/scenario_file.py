@@ -90,8 +90,12 @@ def read_text(path: Path) -> str:
         raise ScenarioError(str(path), [other or f"cannot be read: {error}"]) from None
 
 
-def parse_scenario(text: str, source: str = "scenario", base_dir: str | Path | None = None) -> Scenario:
-    """Return the scenario of a YAML text; `source` names it in errors, `base_dir` is where robot files are.
+def parse_scenario(
+    text: str, source: str = "scenario", base_dir: str | Path | None = None, *, opens: bool = True
+) -> Scenario:
+    """Return the scenario of a YAML text; `source` names it in errors, `base_dir` is where its files are.
+
+    Without `opens` a file that it names is not opened, and a scenario whose reference needs one has a mistake.
 
     Raises
     ------
@@ -99,6 +103,10 @@ def parse_scenario(text: str, source: str = "scenario", base_dir: str | Path | N
         With one line for each mistake: line, column, name, what is wrong and what to do.
     """
     data, tree = read_tree(text, "scenario", A_SCENARIO, source)
+    if not opens and (named := _named(data.get("reference"))):
+        raise ScenarioError(
+            source, [f"reference: the table {shown(named)} is not opened; its rows are not here"]
+        )
     scenario = read_scenario(data, tree, (), base_dir)
     if tree.mistakes or scenario is None:
         raise ScenarioError(source, tree.lines())
@@ -121,6 +129,12 @@ def read_tree(text: str, kind: str, needs: str, source: str) -> tuple[dict[str, 
     if (other := of_another_kind(data, kind, source)) is not None:
         raise ScenarioError(source, [other])
     return data, tree
+
+
+def _named(reference: Any) -> Any:
+    """Return the first file of a table that a reference names; None if there is none."""
+    events = reference if isinstance(reference, list) else [reference]
+    return next((e["table"] for e in events if isinstance(e, dict) and e.get("table")), None)
 
 
 def _found(reference: Any, folder: Path) -> Any:

@@ -142,12 +142,13 @@ def _towards(z: Vector) -> NDArray[np.float64]:
     """Return axes at right angles with their z along a direction."""
     from scipy.spatial.transform import Rotation
 
-    return Rotation.align_vectors([z], [(0, 0, 1)])[0].as_matrix()
+    largest = max(abs(part) for part in z)
+    return Rotation.align_vectors([[part / largest for part in z]], [(0, 0, 1)])[0].as_matrix()
 
 
 def _direction(name: str, v: Vector) -> None:
     """Raise Mistakes for a direction that is none."""
-    if not np.linalg.norm(v) > 0:
+    if not any(v):
         raise Mistakes(((name,), "is no direction; got [0, 0, 0]"))
 
 
