@@ -213,7 +213,5 @@ def test_a_run_does_not_open_the_table_that_its_scenario_names(tmp_path: Path, *
     assert parse_scenario(text).reference
     run.data.attrs["scenario"] = text
     assert run.scenario is None
-    with pytest.raises(
-        ScenarioError, match=r"reference: the table .* is not opened; its rows are not here"
-    ):
+    with pytest.raises(ScenarioError, match=r"reference: the table .* is not opened; its rows are not here"):
         parse_scenario(text, opens=False)
