@@ -75,9 +75,11 @@ STATES: dict[str, Any] = {
     "environment": [{"kind": "load", "from": 0.2, "to": 0.5, "mass": 1.0}],
 }
 """Elements with states of their own, which go along with MuJoCo's stages."""
+SLOW: dict[str, Any] = {"control": {"task_rate": 200, "delay": 1e-3}}
+"""Two rates."""
 
 
-@pytest.mark.parametrize("changes", [{}, LATE, STATES], ids=["ideal", "late", "states"])
+@pytest.mark.parametrize("changes", [{}, LATE, STATES, SLOW], ids=["ideal", "late", "states", "slow"])
 def test_a_run_is_the_same_in_mujoco(changes: dict[str, Any]) -> None:
     one, other = both(resolved(**changes))
     require_same(one, other, angle=1e-11)

@@ -22,7 +22,8 @@ from passiflex.limits.workspace import workspace_postures
 from passiflex.problems.problem import SampledProblem
 from passiflex.robots import FlexibleJointRobot
 from passiflex.simulation import Problem, parse_scenario, resolve, simulate, simulate_problem
-from passiflex.stability.linear_loop import DrivenLoop, LinearLoop
+from passiflex.stability.driven_loop import DrivenLoop
+from passiflex.stability.linear_loop import LinearLoop
 from worlds import merged, world
 
 RATE, DELAY, MARGIN = 1000.0, 1e-3, 0.2

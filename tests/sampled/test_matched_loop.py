@@ -47,7 +47,7 @@ def commands() -> tuple[cs.Function, ImpedanceLaw]:
     reference = Reference(desired, cs.SX.zeros(6))
     acceleration = cs.solve(robot.arm.mass_matrix(q, m), tau_a - robot.arm.bias_torque(q, dq, m))
     seen = SimpleNamespace(seen_ddq=acceleration, in_flight=cs.SX.zeros(1, n))
-    i = AbstractInnerLoop.layout.view(cs.vertcat(T, 0.3, 0.05))
+    i = AbstractInnerLoop.layout.view(cs.vertcat(T, 0.3, 0.05, 1))
     matched = MatchedInnerLoop(0).command(law, y, reference, m, g, cs.SX.zeros(n), seen, i)
     plain = law.command(y, reference, m, g)
     inputs = [q, theta, dq, dtheta, goal, T, model, gains]

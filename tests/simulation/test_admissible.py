@@ -26,7 +26,7 @@ from passiflex.stability.causes import Advice
 from passiflex.stability.judgement import Judgement
 from passiflex.stability.linear_loop import LinearLoop
 from passiflex.stability.modes import Spectrum
-from passiflex.stability.remedies import Remedy
+from passiflex.stability.remedy import Remedy
 from worlds import world
 
 MATCHED = {"inner_loop": "matched", "external_torque": "none"}

@@ -17,6 +17,7 @@ from passiflex.robots.arm import SerialArm
 from passiflex.robots.chain import Body, Joint, SerialChain
 from passiflex.simulation import Problem, parse_scenario, resolve
 from passiflex.simulation.simulate_sampled import longest_step, start
+from passiflex.stability.driven_loop import driven
 from passiflex.stability.linear_loop import LinearLoop
 from passiflex.stability.loop_at_rest import loop_at_rest
 from passiflex.studies import shipped_scenario
@@ -173,7 +174,7 @@ def test_central_differences_agree_with_exact_derivatives(inner: str) -> None:
     n_c = memory.size
     columns = np.concatenate([np.arange(8), 8 + loop.remembered, 8 + n_c + np.arange(2)])
     kept = exact[np.concatenate([loop.remembered, n_c + np.arange(2)])][:, columns]
-    ours = loop._control(PERIOD, PERIOD, {}, noise=True)
+    ours = loop._control(PERIOD, PERIOD, {}, noise=True, due=True)
     scale = np.maximum(np.abs(kept).max(axis=1, keepdims=True), 1)
     assert (np.abs(ours - kept) / scale).max() < 1e-7
 
@@ -238,12 +239,12 @@ def test_the_dominant_mode_names_joint_frequency_and_decay() -> None:
 def test_noise_enters_the_command_as_the_joint_torque_does() -> None:
     """K_e = K: τ_m = τ_a + B/B_e (τ_u − τ_a), so that noise on τ_a comes through with 1 − B/B_e."""
     loop = one_joint_loop(K, 0.2 * B, PERIOD)
-    driven = loop.driven()
-    assert driven.D.item() == pytest.approx(1 - 1 / 0.2, rel=1e-8)
-    np.testing.assert_array_equal(driven.A, loop.matrix())
-    np.testing.assert_array_equal(driven.G[:4], 0)  # the command is a period late, and waits in the last row
-    np.testing.assert_array_equal(driven.G[-1:], driven.D)
-    np.testing.assert_array_equal(driven.A[-1:], driven.C)
+    (found,) = driven(loop)
+    assert found.D.item() == pytest.approx(1 - 1 / 0.2, rel=1e-8)
+    np.testing.assert_array_equal(found.A, loop.matrix())
+    np.testing.assert_array_equal(found.G[:4], 0)  # the command is a period late, and waits in the last row
+    np.testing.assert_array_equal(found.G[-1:], found.D)
+    np.testing.assert_array_equal(found.A[-1:], found.C)
 
 
 def test_limits_resolution_and_friction_are_left_out() -> None:

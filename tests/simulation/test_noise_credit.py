@@ -12,7 +12,8 @@ from passiflex.sampled.measurement_bound import SIGMAS
 from passiflex.scenarios.gain_settings import ShapedInertia
 from passiflex.scenarios.scenario import Noise
 from passiflex.simulation import resolve, simulate
-from passiflex.stability.linear_loop import DrivenLoop, LinearLoop
+from passiflex.stability.driven_loop import DrivenLoop
+from passiflex.stability.linear_loop import LinearLoop
 from passiflex.stability.noise_credit import POSTURES, REACH, charged, mean_credit, noise_credit
 from passiflex.studies import shipped_scenario
 from worlds import PERIOD, merged, ran, world
@@ -31,7 +32,7 @@ def test_one_pole_has_a_closed_form(lasting: int) -> None:
     a, g, variance = 0.9, 1e-3, 0.3
     answers = [g * (1 - a**j) / (1 - a) for j in (lasting - 1, lasting)]
     expected = variance * sum(answers) / (2 * lasting)
-    assert mean_credit(driven(np.array([[a]]), np.array([[-g]])), 1, variance, lasting) == pytest.approx(
+    assert mean_credit([driven(np.array([[a]]), np.array([[-g]]))], 1, variance, lasting) == pytest.approx(
         expected
     )
 
@@ -47,7 +48,7 @@ def test_without_drawing_it_is_what_draws_have_on_average() -> None:
         z[k + 1] = A @ z[k] + G @ noise[k]
     credited = -((noise[1:] + noise[:-1]) / 2 * np.diff(z[:, :2], axis=0)).sum(axis=1)
     drawn = credited[: len(credited) // lasting * lasting].reshape(-1, lasting).mean(axis=1)
-    expected = mean_credit(driven(A, G), 2, 1.0, lasting)
+    expected = mean_credit([driven(A, G)], 2, 1.0, lasting)
     assert abs(drawn.mean() - expected) < 4 * drawn.std() / np.sqrt(len(drawn))
     assert abs(expected) > 20 * drawn.std() / np.sqrt(len(drawn))
 
@@ -56,8 +57,8 @@ def test_an_answer_without_end_is_cut_at_its_reach() -> None:
     """A self-motion that drifts by v per period under a held noise: the credit stops to grow after 1 rad of it."""
     v = 1e-3
     loop = driven(np.array([[1.0]]), np.array([[-v]]))
-    assert mean_credit(loop, 1, 1.0, 500) == pytest.approx(v * (500 + 499) / (2 * 500))
-    assert mean_credit(loop, 1, 1.0, 100_000) == pytest.approx(REACH / 100_000, rel=1e-2)
+    assert mean_credit([loop], 1, 1.0, 500) == pytest.approx(v * (500 + 499) / (2 * 500))
+    assert mean_credit([loop], 1, 1.0, 100_000) == pytest.approx(REACH / 100_000, rel=1e-2)
 
 
 @pytest.mark.parametrize(("hold", "joules"), [(0.005, 0.28), (0.010, 0.63), (0.020, 1.13), (0.050, 2.19)])

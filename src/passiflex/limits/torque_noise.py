@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from passiflex.stability.driven_loop import DrivenLoop, driven, whole_cycle
 from passiflex.stability.law_slope import Gains
-from passiflex.stability.linear_loop import DrivenLoop, LinearLoop
+from passiflex.stability.linear_loop import LinearLoop
 from passiflex.stability.missed import stationary
 from passiflex.stability.modes import coupled, drift_of, projector
 
@@ -29,14 +30,17 @@ def torque_by_noise(
     Of the torque what is faster than `SLOW`: the weight that a slow self-motion shifts between the joints is no
     noise of a motor. inf if the loop is not stable.
     """
-    driven = loop.driven(None, delay, gains)
-    kept = coupled(driven.A).kept
-    tight = DrivenLoop(driven.A[np.ix_(kept, kept)], driven.G[kept], driven.C[:, kept], driven.D)
-    values = np.linalg.eigvals(tight.A)
-    drift = drift_of(tight.A, values, loop.problem.period, loop.task_jacobian)
+    periods = driven(loop, delay, gains)
+    kept = coupled(np.sum([np.abs(p.A) for p in periods], axis=0)).kept
+    tight = [DrivenLoop(p.A[np.ix_(kept, kept)], p.G[kept], p.C[:, kept], p.D) for p in periods]
+    whole = whole_cycle(tight).A
+    values = np.linalg.eigvals(whole)
+    drift = drift_of(whole, values, loop.cycle(), loop.task_jacobian)
     if np.abs(values[~drift]).max(initial=0.0) >= 1:
-        return np.full(len(driven.C), np.inf)
-    return rms_torque(quick(tight, loop.problem.period), variance, values[drift])
+        return np.full(loop.n, np.inf)
+    fast = whole_cycle([quick(p, loop.problem.period) for p in tight])
+    rms = rms_torque(fast, variance, values[drift]).reshape(len(periods), loop.n)
+    return np.asarray(np.sqrt(np.mean(rms**2, axis=0)))
 
 
 def quick(loop: DrivenLoop, period: float) -> DrivenLoop:

@@ -202,6 +202,8 @@ def _write_timing(data: dict[str, Any], period: float, delay: float, rate: float
         data["noise"]["hold"] = float(_held(data["noise"]["hold"], own) * period)
     control["delay"] = float(delay)
     if rate is not None:
+        if "task_rate" in control:  # runs as many periods apart
+            control["task_rate"] *= float(rate) / control["rate"]
         control["rate"] = float(rate)
     data["output_interval"] = float(max(1, round(data["output_interval"] / period)) * period)
 

@@ -186,6 +186,11 @@ class SampledProblem(Problem):
         return SampledLoop(self.controller, self.elements, self.effects)
 
     @cached_property
+    def task_periods(self) -> int:
+        """Return how many periods there are from one run of the outer loop to the next."""
+        return round(float(self.parts.unpack("inner", self.numbers)["task_periods"]))
+
+    @cached_property
     def told_gains(self) -> tuple[GainChange, ...]:
         """Return the gains that the law goes over to, each once, as they would be at the start, in world axes."""
         turned = self.law.task.turned

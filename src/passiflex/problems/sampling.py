@@ -22,7 +22,9 @@ from passiflex.sampled.controller import SampledController
 from passiflex.sampled.measurement_bound import BEND
 from passiflex.sampled.motors import UNLIMITED_TORQUE
 from passiflex.sampled.sensors import UNFILTERED
-from passiflex.scenarios.control_settings import Actions, Control, MotorSettings, SensorSettings
+from passiflex.scenarios.action_settings import Actions
+from passiflex.scenarios.control_settings import Control, SensorSettings
+from passiflex.scenarios.motor_settings import MotorSettings
 from passiflex.scenarios.noise_settings import Noise
 from passiflex.scenarios.scenario import Scenario
 from passiflex.scenarios.setpoints import Table
@@ -71,6 +73,7 @@ def sampled_parts(
         control.build_external(),
         control.build_inner(),
         actions=scenario.actions is not None or bool(feedforward_of(scenario, robot)),
+        held_task=control.build_task(),
     )
     motors, sensors = scenario.motors or MotorSettings(), scenario.sensors or SensorSettings()
     moved = np.diag(known.start.mass_matrix) + gains.get("shaped_inertia", model["motor_inertia"])
@@ -88,6 +91,7 @@ def sampled_parts(
                 "period": 1 / control.rate,
                 "velocity_gain": VELOCITY_GAIN,
                 "acceleration_gain": ACCELERATION_GAIN,
+                "task_periods": control.task_periods,
             },
             "errors": _errors(control, sensors, scenario.noise, robot),
             "sensors": _sensors(sensors, robot),

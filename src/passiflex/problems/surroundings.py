@@ -11,9 +11,9 @@ from passiflex.loops.plant import Elements
 from passiflex.problems.per_joint import per_joint
 from passiflex.problems.problem import Lasting
 from passiflex.robots.flexible import FlexibleJointRobot
-from passiflex.scenarios.control_settings import MotorSettings
 from passiflex.scenarios.environment import labelled
 from passiflex.scenarios.held_settings import Load
+from passiflex.scenarios.motor_settings import MotorSettings
 from passiflex.scenarios.scenario import Scenario
 from passiflex.scenarios.touching import Site
 

@@ -17,6 +17,7 @@ from passiflex.robots.arm import EndEffectorPose
 from passiflex.sampled.actions import action_layout, posture_spring, tracking_wrench
 from passiflex.sampled.external import AbstractExternalTorque, Known, TrueTorque
 from passiflex.sampled.governor import govern_pose, govern_stiffness
+from passiflex.sampled.held_task import HeldTask
 from passiflex.sampled.inner_loop import AbstractInnerLoop, PlainInnerLoop
 from passiflex.sampled.measurement_bound import (
     booked_bound,
@@ -51,6 +52,8 @@ class SampledController:
     inner: AbstractInnerLoop = field(default_factory=PlainInnerLoop)
     actions: bool = True
     """Whether anything acts that the valve gates: without, a third of the arithmetic is left out."""
+    held_task: HeldTask | None = None
+    """Set where the outer loop has a clock of its own, slower than that of the joints."""
 
     @cached_property
     def parameters(self) -> Parts:
@@ -75,13 +78,15 @@ class SampledController:
         """Return what is remembered from one period to the next; energies are sums since the start."""
         n, k = self.law.robot.n, self.law.task.size
         books = period_state(n, k) + bound_state(n) + sure_state(n)
-        return books + self.external.state(n) + self.inner.state(n)
+        own = books + self.external.state(n) + self.inner.state(n)
+        return own + self.held_task.state(n) if self.held_task else own
 
     def start(self, at: Rest) -> Remembered:
         """Return what is remembered at rest, of each field of the state."""
         n, k = self.law.robot.n, self.law.task.size
         bounds = (bound_state(n) + sure_state(n)).zeros()
-        return period_start(n, k, at) | bounds | self.external.start(at) | self.inner.start(at)
+        held = self.held_task.start(at) if self.held_task else {}
+        return period_start(n, k, at) | bounds | self.external.start(at) | self.inner.start(at) | held
 
     def step(
         self,
@@ -101,12 +106,12 @@ class SampledController:
         read = self._read(y, applied, elapsed, s, p)
         force = self._in_force(read, self._settle(read, s, p), s, p)
         granted = self._grant(read, force, setpoint, p)
-        command, valve = self._command(read, force, granted, setpoint, p)
+        command, valve, kept = self._command(read, force, granted, setpoint, s, p)
         variable = self._potential(force.now, granted.pose, granted.stiffness - p.gains.stiffness)
         asked, floor = setpoint.pose.position, p.tank.tank_floor
         values = period_after(read, force, granted, asked, command, variable, floor, s)
         own = Layout(self.state.fields[: len(values)])
-        after = cs.vertcat(own.stack(values), read.observed, read.seen)
+        after = cs.vertcat(own.stack(values), read.observed, read.seen, kept)
         faulty = self.state.stack(vars(s) | {"faults": s.faults + 1, "lost_time": read.elapsed})
         safe = command._replace(tau_m=cs.if_else(ok, command.tau_m, s.last_command))
         entry = LedgerEntry(
@@ -191,9 +196,10 @@ class SampledController:
         f: Force,
         granted: Granted,
         setpoint: Setpoint,
+        s: Any,
         p: ControlParameters,
-    ) -> tuple[Command, cs.SX]:
-        """Return the law's command with what the valve lets through, and the valve."""
+    ) -> tuple[Command, cs.SX, cs.SX]:
+        """Return the law's command with what the valve lets through, the valve, and what is remembered of the task."""
         level = granted.entry.level
         valve = (1 - f.latched) * self.tank.valve(level - f.doubt, p.tank) if self.tank else cs.SX(1)
         g = f.gains
@@ -205,10 +211,20 @@ class SampledController:
         if self.tank:
             torque -= self.tank.braking(level, cs.dot(f.now.dphi, f.now.dphi), r.elapsed, p.tank) * f.now.dphi
         reference, memory = Reference(granted.pose, setpoint.velocity), self.inner.state(self.law.robot.n)
-        command = self.inner.command(
-            self.law, r.y, reference, p.model, g, torque, memory.view(r.seen), p.inner
-        )
-        return command, valve
+
+        def commanded(added: cs.SX) -> Command:
+            return self.inner.command(
+                self.law, r.y, reference, p.model, g, added, memory.view(r.seen), p.inner
+            )
+
+        command = commanded(torque)
+        if self.held_task is None:
+            return command, valve, cs.SX(0, 1)
+        due = self.held_task.due(r.first, r.elapsed, s, p.inner)
+        runs = cs.logic_or(due.now, f.latched > s.latched)
+        held = cs.if_else(runs, command.tau_u, s.task_torque)
+        kept = self.held_task.state(self.law.robot.n).stack({"task_torque": held, "task_age": due.age})
+        return commanded(torque + held - command.tau_u), valve, kept
 
     def _potential(self, at: Stored, reference: EndEffectorPose, stiffness: cs.SX) -> cs.SX:
         return self.law.potential(at, reference, stiffness)

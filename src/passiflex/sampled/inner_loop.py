@@ -28,6 +28,7 @@ class InnerNumbers(Protocol):
     period: cs.SX
     velocity_gain: cs.SX
     acceleration_gain: cs.SX
+    task_periods: cs.SX
 
 
 class AbstractInnerLoop(abc.ABC):
@@ -40,6 +41,7 @@ class AbstractInnerLoop(abc.ABC):
                 "velocity_gain", (), "1", "g: share of the new difference in the link velocity, per period"
             ),
             Field("acceleration_gain", (), "1", "b: share of the new value in the acceleration, per period"),
+            Field("task_periods", (), "1", "from one run of the outer loop to the next"),
         ),
         InnerNumbers,
     )

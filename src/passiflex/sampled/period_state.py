@@ -70,6 +70,7 @@ def period_start(n: int, k: int, at: Rest) -> Remembered:
         "last_q": at.running * at.q,
         "last_tau_a": at.running * at.tau_a,
         "last_command": at.command,
+        "running": at.running,
     }
 
 

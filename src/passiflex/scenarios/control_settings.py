@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
-import numpy as np
 from pydantic import AliasChoices, BeforeValidator, Field, model_validator
 
 from passiflex.scenarios.gain_settings import (
@@ -15,12 +14,14 @@ from passiflex.scenarios.gain_settings import (
     Stiffness,
     free_mistakes,
 )
-from passiflex.scenarios.spans import Instant, TimeSpan
+from passiflex.scenarios.noise_settings import is_multiple
+from passiflex.scenarios.spans import Instant
 from passiflex.texts.quantity import Quantity, shown
 from passiflex.texts.section import Mistakes, Section
 
 if TYPE_CHECKING:  # who reads a scenario needs no CasADi
     from passiflex.sampled.external import AbstractExternalTorque
+    from passiflex.sampled.held_task import HeldTask
     from passiflex.sampled.inner_loop import AbstractInnerLoop
 
 Vector = tuple[float, ...]
@@ -30,9 +31,6 @@ Frequency = Annotated[float, Quantity("Hz", above=0, finite=False)]
 Angle = Annotated[float, Quantity("rad", least=0)]
 Share = Annotated[float, Quantity("1", least=0, most=1)]
 PerJoint = ((), (None,))
-NAMED = ("none", "robot")
-TorqueLimit = Annotated[str | float | Vector, Quantity("N m", PerJoint, above=0, names=NAMED)]
-SpeedLimit = Annotated[str | float | Vector, Quantity("rad/s", PerJoint, above=0, names=NAMED)]
 ENDLESS = float("inf")
 NOW = 1e-9
 """Two instants closer than this are one [s]."""
@@ -70,6 +68,11 @@ class Control(Section):
     """The law runs once per period; its command is held until the next one arrives."""
 
     rate: Annotated[float, Quantity("Hz", above=0, most=1e6)] = Field(description="control rate, Hz")
+    task_rate: Annotated[float, Quantity("Hz", above=0, most=1e6)] | None = Field(
+        default=None,
+        description="rate of the outer loop, Hz, whose torque is held for the inner one in between; "
+        "that of control if left out",
+    )
     delay: Instant = Field(
         default=0.0,
         description="from a sample to the arrival of its command, s; the matched inner loop predicts over "
@@ -124,6 +127,32 @@ class Control(Section):
             round(self.delay * self.rate)
         )
 
+    @property
+    def task_periods(self) -> int:
+        """Return how many periods there are from one run of the outer loop to the next."""
+        return 1 if self.task_rate is None else round(self.rate / self.task_rate)
+
+    def build_task(self) -> HeldTask | None:
+        """Return what holds the torque of a slower outer loop."""
+        from passiflex.sampled.held_task import HeldTask
+
+        return HeldTask() if self.task_periods > 1 else None
+
+    @model_validator(mode="after")
+    def _slower_task(self) -> Self:
+        if self.task_rate is None:
+            return self
+        if not is_multiple(self.rate / self.task_rate):
+            needs = f"rate, {self.rate:g} Hz, needs to be a whole multiple of it"
+            raise Mistakes((("task_rate",), f"{needs}; got {self.task_rate:g} Hz"))
+        if self.task_periods > 1 and self.inner_loop == "matched":
+            holds = "the matched inner loop holds the damping of the outer one in its own clock"
+            raise Mistakes((("inner_loop",), f"{holds}; with task_rate take plain"))
+        if self.task_periods > 1 and self.missed:
+            judged = "periods missed at random are judged for one rate only"
+            raise Mistakes((("missed",), f"{judged}; take lost bursts, or leave task_rate out"))
+        return self
+
     @model_validator(mode="after")
     def _few_on_their_way(self) -> Self:
         periods = (self.delay + self.jitter) * self.rate
@@ -170,86 +199,6 @@ class SensorSettings(Section):
     )
     wrench_bandwidth: Frequency = Field(
         default=ENDLESS, description="pole of the wrench sensor, Hz; inf for none"
-    )
-
-
-class MotorSettings(Section):
-    """What the motors make of a command; without it they give it exactly."""
-
-    torque_limit: TorqueLimit = Field(
-        default="none",
-        description="largest torque: none, that of the robot's description, or in N m, one number or one each",
-    )
-    torque_rate_limit: Annotated[float | Vector, Quantity("N m/s", PerJoint, above=0, finite=False)] = Field(
-        default=ENDLESS,
-        description="fastest change of the torque, one number or one each, N m/s; inf for none",
-    )
-    speed_limit: SpeedLimit = Field(
-        default="none",
-        description="beyond which a motor is braked: none, that of the robot's description, or in rad/s, one number "
-        "or one each",
-    )
-    friction: Literal["sticks", "smooth"] = Field(
-        default="smooth",
-        description="how coulomb_friction acts: it sticks, or it is smooth and creeps where it should stick",
-    )
-    coulomb_friction: Annotated[float | Vector, Quantity("N m", PerJoint, least=0)] = Field(
-        default=0.0, description="at the motors, one number for all joints or one each, N m"
-    )
-    viscous_friction: Annotated[float | Vector, Quantity("N m s/rad", PerJoint, least=0)] = Field(
-        default=0.0, description="at the motors, one number for all joints or one each, N m s/rad"
-    )
-    friction_width: Annotated[float, Quantity("rad/s", above=0)] = Field(
-        default=0.01, description="speed over which Coulomb friction changes its sign, rad/s"
-    )
-
-    static_friction: Annotated[float, Quantity("1", least=1, most=10)] = Field(
-        default=1.0, description="of friction that sticks, before it slips, as a multiple of coulomb_friction"
-    )
-    stribeck_speed: Annotated[float, Quantity("rad/s", above=0)] = Field(
-        default=0.01, description="over which it falls from there to coulomb_friction, rad/s"
-    )
-    break_away: Annotated[float, Quantity("rad", above=0)] = Field(
-        default=1e-4, description="by which a motor gives way before it slips, seen from the link, rad"
-    )
-
-    def require_unlimited(self) -> None:
-        """Raise Mistakes for limits, which only a sampled run has."""
-        said = {
-            "torque_limit": self.torque_limit != "none",
-            "torque_rate_limit": min(np.atleast_1d(self.torque_rate_limit)) < ENDLESS,
-        }
-        if found := [
-            ((name,), "needs `control`: only a sampled run has it") for name, is_set in said.items() if is_set
-        ]:
-            raise Mistakes(*found)
-
-
-class Actions(Section):
-    """What is not passive, and only acts as far as the tank's valve is open."""
-
-    posture_stiffness: Annotated[float | Vector, Quantity("N m/rad", PerJoint, least=0)] = Field(
-        default=0.0, description="of a spring in the null space toward `posture`, N m/rad"
-    )
-    posture_damping: Annotated[float | Vector, Quantity("N m s/rad", PerJoint, least=0)] | None = Field(
-        default=None,
-        description="of the same motion, N m s/rad; a ratio of 0.7 of each joint at the start if left out",
-    )
-    posture: Annotated[Vector, Quantity("rad", ((None,),))] | None = Field(
-        default=None, description="joint angles that this spring pulls to, rad; the start if left out"
-    )
-    follow_velocity: Share = Field(default=0.0, description="share of D_x ẋ_d that is fed forward, 0 to 1")
-    follow_acceleration: Share = Field(default=0.0, description="share of Λ ẍ_d that is fed forward, 0 to 1")
-
-
-class Feedforward(TimeSpan):
-    """A wrench that the end effector is to exert for some time, as far as the valve is open."""
-
-    force: Annotated[Vector, Quantity("N", ((3,),))] = Field(
-        default=(0.0, 0.0, 0.0), description="force in world axes, N"
-    )
-    moment: Annotated[Vector, Quantity("N m", ((3,),))] = Field(
-        default=(0.0, 0.0, 0.0), description="moment in world axes, N m"
     )
 
 

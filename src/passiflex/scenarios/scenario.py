@@ -7,13 +7,11 @@ from typing import Annotated, Any, Self
 import yaml
 from pydantic import AliasChoices, Field, ValidationInfo, field_validator, model_validator
 
+from passiflex.scenarios.action_settings import Actions, Feedforward
 from passiflex.scenarios.carried import Payload, Tool
 from passiflex.scenarios.control_settings import (
-    Actions,
     Control,
-    Feedforward,
     GainChange,
-    MotorSettings,
     SensorSettings,
     change_mistakes,
     gain_mistakes,
@@ -22,6 +20,7 @@ from passiflex.scenarios.environment import Touching, as_drags, labelled
 from passiflex.scenarios.events import ReferenceEvent, event_mistakes, turning
 from passiflex.scenarios.law_settings import LawSettings
 from passiflex.scenarios.model_errors import Deviations, ModelErrors
+from passiflex.scenarios.motor_settings import MotorSettings
 from passiflex.scenarios.noise_settings import Noise
 from passiflex.scenarios.posture import StartPosture
 from passiflex.scenarios.reference import ZERO
@@ -170,6 +169,8 @@ class Scenario(Section):
         if not info.data["law"].shapes:
             if control.inner_loop == "matched":
                 raise Mistakes((("inner_loop",), "the rigid law has no inner loop; take plain"))
+            if control.task_periods > 1:
+                raise Mistakes((("task_rate",), "the rigid law has no inner loop; leave it out"))
             return control
         found = gain_mistakes(control.fallback, info.data["law"].task, info.data["law"].stiffness.free)
         if found:

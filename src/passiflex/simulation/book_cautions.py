@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from passiflex.problems.altered import altered
 from passiflex.problems.problem import Problem, SampledProblem
+from passiflex.stability.driven_loop import driven, whole_cycle
 from passiflex.stability.linear_loop import LinearLoop
 from passiflex.stability.noise_credit import POSTURES, REACH, noise_credit
 
@@ -74,9 +75,9 @@ def _offset(problem: SampledProblem) -> tuple[str, ...]:
 def _moved_by(problem: SampledProblem, offset: Array) -> Array:
     """Return |q − q₀| (n,) at the end of the run for the worst signs of an offset (n,), by the linear loop."""
     loop = LinearLoop(problem)
-    driven = loop.driven()
-    answer, power = driven.G, driven.A
-    for _ in range(max(1, int(np.log2(problem.duration / problem.period)))):
+    whole = whole_cycle(driven(loop))
+    answer, power = whole.G.reshape(len(whole.G), -1, loop.n).sum(axis=1), whole.A
+    for _ in range(max(1, int(np.log2(problem.duration / loop.cycle())))):
         answer, power = answer + power @ answer, power @ power
         if np.abs(answer[: loop.n]).max() * offset.max() > REACH:
             break

@@ -13,8 +13,9 @@ from passiflex.problems.problem import Problem
 from passiflex.stability.clock_words import counted, delay_words, hertz
 from passiflex.stability.judgement import Judgement
 from passiflex.stability.linear_loop import LinearLoop
-from passiflex.stability.modes import Modes, self_motions
-from passiflex.stability.remedies import TOOL, Remedy, remedies
+from passiflex.stability.modes import self_motions
+from passiflex.stability.remedies import TOOL, remedies
+from passiflex.stability.remedy import Remedy
 from passiflex.stability.trial import Change, Trial
 
 SLOW = 0.5
@@ -136,7 +137,7 @@ def _is_self_motion(t: Trial) -> bool:
     """Return whether the end effector hardly moves in the mode that grows."""
     case = t.cases[0]
     J = t.loop.task_jacobian
-    modes = Modes.of(case.loop.matrix(None, t.found.delay, case.gains), t.loop.problem.period, J)
+    modes = case.loop.modes(case.loop.matrix(None, t.found.delay, case.gains))
     if not self_motions(J):
         return False
     worst = int(np.argmax(np.where(modes.drifting, 0, np.abs(modes.values))))

@@ -54,16 +54,19 @@ class LawSlope:
         self.remembered = _acting(compiled.loop)
         self.n = problem.law.robot.n
         self.x = compiled.loop.plant.at_rest(at.q, at.theta, at.arm.pose)
-        self._known: dict[tuple[float, float, Key], Array] = {}
+        self._known: dict[tuple[float, float, Key, bool], Array] = {}
         self._rest: tuple[tuple[float, Key], AtRest] | None = None
 
-    def by(self, period: float, elapsed: float, gains: Gains) -> Array:
-        """Return the derivative `elapsed` seconds after the law last ran, with gains in place of the problem's."""
-        key = (period, elapsed, hashable(gains))
+    def by(self, period: float, elapsed: float, gains: Gains, *, due: bool = True) -> Array:
+        """Return the derivative `elapsed` seconds after the law last ran, with gains in place of the problem's.
+
+        An outer loop with a clock of its own runs if it is `due`; else its last torque is held.
+        """
+        key = (period, elapsed, hashable(gains), due)
         if key not in self._known:
             if len(self._known) >= KEPT:
                 self._known.pop(next(iter(self._known)))
-            self._known[key] = self._differences(period, elapsed, gains)
+            self._known[key] = self._differences(period, elapsed, gains, due)
         return self._known[key]
 
     def torque(self, at: Standing) -> Array:
@@ -74,10 +77,13 @@ class LawSlope:
         K, D = np.diag(seen * plant["joint_stiffness"]), np.diag(seen * plant["joint_damping"])
         return np.hstack([-K, K, -D, D, np.zeros((self.n, self.x.size - 4 * self.n))])
 
-    def _differences(self, period: float, elapsed: float, gains: Gains) -> Array:
+    def _differences(self, period: float, elapsed: float, gains: Gains, due: bool) -> Array:
         control, told = self.compiled.control, self.compiled.loop.row.slices["torque_noise"]
         own = self.parts["gains"].unpack(self.problem.gains) | {k: np.asarray(v) for k, v in gains.items()}
         memory, row, phi = self._at_rest(own, elapsed)
+        if due and self.problem.controller.held_task:
+            memory = memory.copy()
+            memory[self.compiled.loop.memory.slices["task_age"]] = self.problem.task_periods * period
         numbers = self.parts.replaced(self.numbers, own, "gains")
         numbers = self.parts.replaced(numbers, {"period": period}, "inner")
         numbers = self.parts.replaced(numbers, {"posture": phi}, "actions")  # at rest, that spring is slack

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cached_property
-from typing import Any, NamedTuple
+from functools import cached_property, reduce
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,27 +19,8 @@ from passiflex.stability.timing import Timing
 
 Array = NDArray[np.float64]
 
-NODES, WEIGHTS = (np.polynomial.legendre.leggauss(4)[0] + 1) / 2, np.polynomial.legendre.leggauss(4)[1] / 2
-"""Of a quadrature over 0 to 1."""
-
-
 FORGOTTEN = 1e4
 """[1/s] How fast a state fades out that moves nothing."""
-
-
-class DrivenLoop(NamedTuple):
-    """z⁺ = A z + G w, τ = C z + D w: the loop with the noise w of the torque sensors, and its command τ.
-
-    Attributes
-    ----------
-    A: (N, N), what `LinearLoop.matrix` returns.
-    G, C, D: (N, n), (n, N), (n, n).
-    """
-
-    A: Array
-    G: Array
-    C: Array
-    D: Array
 
 
 class LinearLoop:
@@ -77,25 +57,38 @@ class LinearLoop:
         self, period: float | None = None, delay: float | None = None, gains: Gains | None = None
     ) -> Spectrum:
         """Return the dominant mode; period and delay [s] and gains are the problem's own unless given."""
-        T = self.problem.period if period is None else period
-        modes = Modes.of(self.matrix(period, delay, gains), T, self.task_jacobian)
-        return modes.dominant(self.n, self.kinetic)
+        maps, periods = self.maps(period, delay, gains), len(self.phases)
+        mode = self.modes(product(maps), period).dominant(self.n, self.kinetic, maps)
+        return mode._replace(radius=mode.radius ** (1 / periods))
+
+    def modes(self, matrix: Array, period: float | None = None) -> Modes:
+        """Return the modes of what `matrix` returns."""
+        return Modes.of(matrix, self.cycle(period), self.task_jacobian)
 
     def radius(
         self, period: float | None = None, delay: float | None = None, gains: Gains | None = None
     ) -> float:
-        """Return the spectral radius alone, in half the time; drift is no part of it."""
-        T = self.problem.period if period is None else period
-        return Modes.radius_of(self.matrix(period, delay, gains), T, self.task_jacobian)
+        """Return the spectral radius of a period alone, in half the time; drift is no part of it."""
+        whole = Modes.radius_of(self.matrix(period, delay, gains), self.cycle(period), self.task_jacobian)
+        return float(whole ** (1 / len(self.phases)))
 
     def holds(self, period: float, delay: float, gains: Gains) -> bool:
         """Return whether `radius` is below 1, sooner."""
-        return Modes.stable_of(self.matrix(period, delay, gains), period, self.task_jacobian)
+        return Modes.stable_of(self.matrix(period, delay, gains), self.cycle(period), self.task_jacobian)
 
     def trembling(self, delay: float, gains: Gains, settling: float) -> float:
         """Return the radius of what trembles, as `Modes.trembling_of` has it."""
         matrix = self.matrix(None, delay, gains)
-        return Modes.trembling_of(matrix, self.problem.period, self.task_jacobian, settling)
+        return Modes.trembling_of(matrix, self.cycle(), self.task_jacobian, settling)
+
+    @cached_property
+    def phases(self) -> tuple[bool, ...]:
+        """Return of each period of a cycle whether the outer loop runs in it; where it has no own clock, it is one."""
+        return (True, *(False for _ in range(self.problem.task_periods - 1)))
+
+    def cycle(self, period: float | None = None) -> float:
+        """Return how long a cycle takes [s]."""
+        return len(self.phases) * (self.problem.period if period is None else period)
 
     def matrix(
         self,
@@ -104,31 +97,41 @@ class LinearLoop:
         gains: Gains | None = None,
         lined: int = 0,
     ) -> Array:
-        """Return the map of (x, what is remembered, commands on their way) over one period.
+        """Return the map of (x, what is remembered, commands on their way) over one cycle.
 
         With room for at least `lined` commands, so that maps of other delays are as large.
         """
-        timing = self._timing(period, delay, lined)
-        return self.flow(timing) @ self.runs(timing, gains)
+        return product(self.maps(period, delay, gains, lined))
 
-    def driven(
-        self, period: float | None = None, delay: float | None = None, gains: Gains | None = None
-    ) -> DrivenLoop:
-        """Return the same with the noise of the torque sensors, and the command that it makes."""
-        timing = self._timing(period, delay)
-        flow, ran = self.flow(timing), self.runs(timing, gains, noise=True)
-        size = flow.shape[0]
-        sent = ran[self._told : self._told + self.n]
-        return DrivenLoop(flow @ ran[:, :size], flow @ ran[:, size:], sent[:, :size], sent[:, size:])
+    def maps(
+        self,
+        period: float | None = None,
+        delay: float | None = None,
+        gains: Gains | None = None,
+        lined: int = 0,
+    ) -> list[Array]:
+        """Return the maps of the periods of a cycle, in their order."""
+        timing = self.timing(period, delay, lined)
+        flow, of = self.flow(timing), dict[bool, Array]()
+        for due in dict.fromkeys(self.phases):
+            of[due] = flow @ self.runs(timing, gains, due=due)
+        return [of[due] for due in self.phases]
 
     def runs(
-        self, timing: Timing, gains: Gains | None = None, elapsed: float | None = None, *, noise: bool = False
+        self,
+        timing: Timing,
+        gains: Gains | None = None,
+        elapsed: float | None = None,
+        *,
+        noise: bool = False,
+        due: bool = True,
     ) -> Array:
         """Return what the law does at a sample: (x, memory, commands) → the same with its own command first.
 
         `elapsed` [s] is the time since it last ran, one period unless given. With noise, further columns.
+        An outer loop with its own clock runs if it is `due`.
         """
-        law = self._control(timing.period, elapsed or timing.period, dict(gains or {}), noise)
+        law = self._control(timing.period, elapsed or timing.period, dict(gains or {}), noise, due)
         n, told = self.n, self._told
         heard = law.shape[1] - told
         out = np.zeros((told + (timing.lined + 1) * n, told + timing.lined * n + heard))
@@ -156,13 +159,13 @@ class LinearLoop:
             return slice(told + ago * n, told + (ago + 1) * n)
 
         if timing.part:
-            early, gain_early = self._held(timing.part * timing.period)
-            rest, gain_rest = self._held((1 - timing.part) * timing.period)
+            early, gain_early = self.held(timing.part * timing.period)
+            rest, gain_rest = self.held((1 - timing.part) * timing.period)
             out[:n_x, :n_x] = rest @ early
             out[:n_x, sent(timing.whole + 1)] = rest @ gain_early
             out[:n_x, sent(timing.whole)] += gain_rest
         else:
-            out[:n_x, :n_x], out[:n_x, sent(timing.whole)] = self._held(timing.period)
+            out[:n_x, :n_x], out[:n_x, sent(timing.whole)] = self.held(timing.period)
         out[n_x:told, n_x:told] = np.eye(told - n_x)
         out[told:, told : told + timing.lined * n] = np.eye(timing.lined * n)
         return out
@@ -186,42 +189,18 @@ class LinearLoop:
         other._kin = self
         return other
 
-    def heard(self, at: Standing, period: float, elapsed: float, gains: Gains) -> Array:
+    def heard(self, at: Standing, period: float, gains: Gains, *, due: bool = True) -> Array:
         """Return what another robot's τ_a adds to the law's derivative by x: it is all that the law sees of a robot."""
-        return self._heard((self._kin or self).law.torque(at) - self._torque, period, elapsed, gains)
+        return self._heard((self._kin or self).law.torque(at) - self._torque, period, period, gains, due)
 
-    def _heard(self, torque: Array, period: float, elapsed: float, gains: Gains) -> Array:
-        by_torque = (self._kin or self).law.by(period, elapsed, gains)[:, self._told :]
+    def _heard(self, torque: Array, period: float, elapsed: float, gains: Gains, due: bool) -> Array:
+        by_torque = (self._kin or self).law.by(period, elapsed, gains, due=due)[:, self._told :]
         return np.asarray(by_torque @ torque)
 
     @cached_property
     def _torque(self) -> Array:
         """Return ∂τ_a/∂x of this robot, as the law hears it."""
         return (self._kin or self).law.torque(self.at)
-
-    def by_plant(self, timing: Timing, left: NDArray[Any], ran: NDArray[Any]) -> NDArray[Any]:
-        """Return the derivative of leftᴴ `flow` ran by the entries of [A B] of the plant (m, N, N + n).
-
-        With ẋ = A x + B u it is ∫ p (x, u)ᵀ dt, where ṗ = −Aᵀ p leads to `left` at the period's end; by Gauss's
-        quadrature. Columns of `left` and of `ran`, what the law leaves of a vector, go in pairs.
-        """
-        n, n_x, told = self.n, self.x.size, self._told
-        p_end, x = left[:n_x].conj().T, ran[:n_x]
-        pieces = [(timing.whole + 1, timing.part), (timing.whole, 1 - timing.part)]
-        out = np.zeros((left.shape[1], n_x, n_x + n), dtype=complex)
-        for i, (ago, share) in enumerate(pieces):
-            if not share:
-                continue
-            long, u = share * timing.period, ran[told + ago * n : told + (ago + 1) * n]
-            rest = self._held(pieces[1][1] * timing.period)[0] if i == 0 else np.eye(n_x)
-            for node, mirrored, weight in zip(NODES, NODES[::-1], WEIGHTS, strict=True):
-                moved, pushed = self._held(node * long)
-                p = p_end @ rest @ self._held(mirrored * long)[0]
-                here = np.concatenate([moved @ x + pushed @ u, u])
-                out += weight * long * np.einsum("mi,jm->mij", p, here)
-            moved, pushed = self._held(long)
-            x = moved @ x + pushed @ u
-        return out
 
     def plants(self, others: Sequence[Standing]) -> Array:
         """Return [A B] of other robots, or of this one elsewhere (M, N, N + n): all by one call of compiled code."""
@@ -254,7 +233,8 @@ class LinearLoop:
         """Return the size of (x, what is remembered)."""
         return self.x.size + self.remembered.size
 
-    def _timing(self, period: float | None, delay: float | None, lined: int = 0) -> Timing:
+    def timing(self, period: float | None = None, delay: float | None = None, lined: int = 0) -> Timing:
+        """Return a timing, with the problem's own period and delay [s] unless given."""
         T = self.problem.period if period is None else period
         return Timing.of(T, self.problem.delay if delay is None else delay, lined)
 
@@ -268,7 +248,7 @@ class LinearLoop:
         layout = self.parts["plant"]
         return layout.pack(layout.unpack(at.plant) | {"coulomb_friction": np.zeros(self.n)})
 
-    def _held(self, time: float) -> tuple[Array, Array]:
+    def held(self, time: float) -> tuple[Array, Array]:
         """Return Φ and Γ of the plant over `time` under a held command."""
         if time not in self._flows:
             n_x = self.x.size
@@ -278,14 +258,19 @@ class LinearLoop:
             self._flows[time] = whole[:n_x, :n_x], whole[:n_x, n_x:]
         return self._flows[time]
 
-    def _control(self, period: float, elapsed: float, gains: Gains, noise: bool) -> Array:
+    def _control(self, period: float, elapsed: float, gains: Gains, noise: bool, due: bool) -> Array:
         """Return the law's derivative, by the noise too if wanted."""
         kin = self._kin
-        found = (kin or self).law.by(period, elapsed, gains)
+        found = (kin or self).law.by(period, elapsed, gains, due=due)
         if kin is not None:
             found = found.copy()
-            found[:, : self.x.size] += kin._heard(self._torque - kin._torque, period, elapsed, gains)
+            found[:, : self.x.size] += kin._heard(self._torque - kin._torque, period, elapsed, gains, due)
         return found if noise else found[:, : self._told]
+
+
+def product(maps: Sequence[Array]) -> Array:
+    """Return what one map after the other does; the first is the first."""
+    return reduce(lambda done, then: np.asarray(then @ done), maps)
 
 
 def _without_counters(plants: Array, robot: int) -> Array:

@@ -43,7 +43,7 @@ def judged_gains(loop: LinearLoop, delay: float) -> tuple[GainChange, ...]:
     varied = np.flatnonzero(np.ptp(numbers, axis=0) > 0)
     centre, coordinates = numbers.mean(axis=0), numbers[:, varied] - numbers[:, varied].mean(axis=0)
     first, slopes = _maps(loop, delay, centre, varied, np.abs(coordinates).max(axis=0))
-    chosen = _nearest(first, slopes, coordinates, loop.problem.period)
+    chosen = _nearest(first, slopes, coordinates, loop.cycle())
     for i in chosen:
         true = _map(loop, delay, numbers[i])
         if np.abs(first + np.tensordot(coordinates[i], slopes, 1) - true).max() > LINEAR * np.abs(true).max():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -106,16 +107,25 @@ class Modes:
         quick = float(sizes[fast].max(initial=0.0)) * math.exp(settling * period)
         return max(slow, quick) if slow >= 1 else quick
 
-    def dominant(self, n: int, inertia: Array) -> Spectrum:
-        """Return the mode that matters; `inertia` (2n,) is that of links and motors."""
+    def dominant(self, n: int, inertia: Array, within: Sequence[Array] = ()) -> Spectrum:
+        """Return the mode that matters; `inertia` (2n,) is that of links and motors.
+
+        `within` are the maps that make up this one, by which a motion is seen that is faster than half a turn in it.
+        """
         kept = np.flatnonzero(~self.drifting)
         worst = kept[np.argmax(np.abs(self.values[kept]))]
         modulus, vector = abs(self.values[worst]), np.abs(self.vectors[: 2 * n, worst])
+        angle = float(np.angle(self.values[worst]))
+        if (
+            len(within) > 1
+        ):  # of the angles that the eigenvalue allows, the one that the mode is seen to turn by
+            turns = (_turned(self.vectors[:, worst], within, 2 * n) - angle) / (2 * math.pi)
+            angle += 2 * math.pi * round(turns)
         energy = inertia * vector**2  # its speeds are the rate of the mode times these
         drift = np.log(np.maximum(np.abs(self.values[self.drifting]), HELD)) / self.period
         return Spectrum(
             radius=float(modulus),
-            frequency=abs(float(np.angle(self.values[worst]))) / (2 * math.pi * self.period),
+            frequency=abs(angle) / (2 * math.pi * self.period),
             joint=int(np.argmax(vector[:n] + vector[n:])) + 1,
             decay=-math.log(max(modulus, 1e-300)) / self.period,
             drifting=int(self.drifting.sum()),
@@ -123,6 +133,16 @@ class Modes:
             undamped=int(self.drifting.sum()) > self.free,
             link_share=float(energy[:n].sum() / max(energy.sum(), 1e-300)),
         )
+
+
+def _turned(vector: NDArray[Any], maps: Sequence[Array], positions: int) -> float:
+    """Return about the angle by which the positions of a mode turn in all, map by map."""
+    angle = 0.0
+    for each in maps:
+        after = each @ vector
+        angle += float(np.angle(np.vdot(vector[:positions], after[:positions])))
+        vector = after
+    return angle
 
 
 def lasting(matrix: Array, period: float, task_jacobian: Array) -> NDArray[Any]:

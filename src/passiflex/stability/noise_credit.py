@@ -6,13 +6,15 @@ E[nᵀ q̇] < 0, and a tank that books τ_aᵀ q̇ is credited with energy that 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from itertools import cycle, islice
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from passiflex.problems.problem import SampledProblem
-from passiflex.stability.linear_loop import DrivenLoop, LinearLoop
+from passiflex.stability.driven_loop import DrivenLoop, driven
+from passiflex.stability.linear_loop import LinearLoop
 from passiflex.stability.many_gains import FEW, extremes
 
 POSTURES = 1.5
@@ -24,20 +26,26 @@ REACH = 1.0
 """Displacement [rad, m] up to which a linear loop is believed: a self-motion that nothing holds never stops in it."""
 
 
-def mean_credit(loop: DrivenLoop, joints: int, variance: float, lasting: int) -> float:
+def mean_credit(periods: Sequence[DrivenLoop], joints: int, variance: float, lasting: int) -> float:
     """Return the mean of −Σ ½ (n_k + n_k+1)ᵀ (q_k+1 − q_k) per period [J], for noise n of this variance [(N m)²].
 
     Each sample of the noise lasts for so many periods L, and is independent of all before it, so that only
     its own answer counts: with R_j the derivative of q_j by a noise held from period 0 on, by parts,
     −½ σ² tr(R_L + R_L−1) / L. The first `joints` states are q. An answer of more than `REACH` ends there.
+    Noise begins in any of the periods of a cycle: the mean of them all.
     """
-    answer, before = np.zeros_like(loop.G), np.zeros_like(loop.G)
+    found = [_credit([*periods[k:], *periods[:k]], joints, variance, lasting) for k in range(len(periods))]
+    return float(np.mean(found))
+
+
+def _credit(periods: Sequence[DrivenLoop], joints: int, variance: float, lasting: int) -> float:
+    answer = before = np.zeros_like(periods[0].G)
     deviation = np.sqrt(variance)
-    for _ in range(lasting):
-        answer, before = loop.A @ answer + loop.G, answer
+    for period in islice(cycle(periods), lasting):
+        answer, before = period.A @ answer + period.G, answer
         moved = np.abs(answer[:joints]).max()
         still = np.abs((answer - before)[:joints]).max() < SETTLED * moved
-        if still or deviation * moved > REACH:
+        if (still and len(periods) == 1) or deviation * moved > REACH:
             break
     return -variance * float(np.trace((answer + before)[:joints])) / (2 * lasting)
 
@@ -59,7 +67,7 @@ def noise_credit(problem: SampledProblem) -> float:
         {"stiffness": c.stiffness, "damping": c.damping} for c in extremes(problem.told_gains, FEW)
     ]
     powers = [
-        mean_credit(loop.driven(gains=gains), loop.n, noise.variance, lasting) / problem.period
+        mean_credit(driven(loop, gains=gains), loop.n, noise.variance, lasting) / problem.period
         for gains in ({}, *later, loop.fallback())
         if loop.radius(gains=gains) < 1
     ]

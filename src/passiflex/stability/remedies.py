@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from passiflex.errors import PassiflexError
-from passiflex.problems.altered import altered, rewritten, with_flange
-from passiflex.problems.problem import Problem, require_sampled
-from passiflex.problems.resolution import resolve
-from passiflex.scenarios.scenario_file import parse_scenario
-from passiflex.stability.clock_words import hertz
-from passiflex.stability.judgement import Judgement, holds, judged_fallback
+from passiflex.problems.altered import rewritten, with_flange
+from passiflex.problems.problem import Problem
+from passiflex.stability.clock_remedies import faster, faster_task, fewer_missed, sooner, without_jitter
+from passiflex.stability.judgement import Judgement, holds
+from passiflex.stability.remedy import INSIDE, Remedy, tried
 from passiflex.stability.trial import Change, Trial
 
 Array = NDArray[np.float64]
@@ -26,26 +24,8 @@ WEAKER = np.geomspace(0.8, 0.01, 12)
 STRONGER = np.geomspace(1.25, 100, 12)
 DAMPINGS = (2.0, 5.0, 10.0, 20.0, 50.0, 0.0)
 """k_ns [1/s] that are tried."""
-FASTER = np.geomspace(1.25, 200, 16)
-SHARES = (0.75, 0.5, 0.25, 0.1, 0.0)
-"""Of a delay or of the periods that are missed."""
 TOOL = 0.02
 """Inertia of a tool [kg m^2] that a bare flange may lack."""
-INSIDE = 1.2
-"""How far beyond a border a gain is offered."""
-
-
-class Remedy(NamedTuple):
-    """A change after which the law holds.
-
-    Attributes
-    ----------
-    words: What to change, and from what.
-    entry: What to write into the scenario; empty for what is no entry of it, as a tool.
-    """
-
-    words: str
-    entry: Mapping[str, Any]
 
 
 def remedies(problem: Problem, found: Judgement) -> Iterator[Remedy]:
@@ -53,7 +33,7 @@ def remedies(problem: Problem, found: Judgement) -> Iterator[Remedy]:
     trial = Trial(problem, found)
     for look in LOST if found.missed else FAST:
         for remedy in look(trial):
-            if _is_new(problem, remedy) and _tried(problem, remedy):
+            if _is_new(problem, remedy) and tried(problem, remedy):
                 yield remedy
     if holds(with_flange(trial.loop.problem, TOOL), native=False):
         yield Remedy(f"a tool with an inertia of {TOOL:g} kg m² on the flange, in the robot's file too", {})
@@ -184,48 +164,6 @@ def _self_motion(t: Trial) -> Iterator[Remedy]:
             return
 
 
-def _missed(t: Trial) -> Iterator[Remedy]:
-    now = t.loop.problem.missed
-    share = next((s for s in SHARES if now and t.stable(missed=s * now)), None)
-    if share is not None:
-        words = f"at most {100 * share * now:.2g} % of the periods missed (now {100 * now:.2g} %)"
-        yield Remedy(words, {"control": {"missed": share * now}})
-
-
-def _rate(t: Trial) -> Iterator[Remedy]:
-    """Yield a higher rate, with as many periods of delay."""
-    factor = next((f for f in map(float, FASTER) if t.stable(stretched=1 / f)), None)
-    if factor is None:
-        return
-    s = t.loop.problem
-    rows = 1 / t.problem.output_interval  # of which the new rate is a multiple, so that the rows still fit
-    rate = math.ceil(INSIDE * factor / s.period / rows - 1e-9) * rows
-    late, jitter = s.delay / s.period / rate, s.jitter / s.period / rate
-    what = " and ".join(name for name, value in (("delay", late), ("jitter", jitter)) if value)
-    words = f"a rate of {hertz(rate)}" + (f", with as many periods of {what}" if what else "")
-    yield Remedy(words, {"control": {"rate": rate, "delay": late, "jitter": jitter}})
-
-
-def _delay(t: Trial) -> Iterator[Remedy]:
-    """Yield less delay, if the loop was not built for its own."""
-    s = t.loop.problem
-    if s.controller.inner.predicts:
-        return
-    now = s.delay + s.jitter
-    share = next((v for v in SHARES if now and t.stable(late=v * now)), None)
-    if share is not None:
-        late = float(f"{share * now:.3g}")
-        entry = {"control": {"delay": min(s.delay, late), "jitter": max(late - s.delay, 0.0)}}
-        least = f"a delay of at most {1e3 * late:.3g} ms" if late else "no delay"
-        yield Remedy(f"{least} (now {1e3 * now:.3g} ms)", entry)
-
-
-def _jitter(t: Trial) -> Iterator[Remedy]:
-    s = t.loop.problem
-    if s.jitter and t.stable(late=s.delay):
-        yield Remedy(f"no jitter (now {1e3 * s.jitter:.3g} ms)", {"control": {"jitter": 0.0}})
-
-
 def _as_the_law(t: Trial) -> Iterator[Remedy]:
     """Yield a fallback that is shaped as the law is, which holds if that law does."""
     if t.found.part != "fallback" or not t.shapes or t.loop.problem.allow_unstable:
@@ -246,10 +184,10 @@ def _other_loop(t: Trial) -> Iterator[Remedy]:
 
 
 FAST = (
-    _jitter, _inertia, _unshaped, _damping, _stiffness, _softer, _as_the_law, _self_motion, _rate, _delay,
-    _other_loop,
+    without_jitter, faster_task, _inertia, _unshaped, _damping, _stiffness, _softer, _as_the_law, _self_motion, faster,
+    sooner, _other_loop,
 )  # fmt: skip
-LOST = (_missed, _inertia, _other_loop)
+LOST = (fewer_missed, _inertia, _other_loop)
 """What is tried, where periods are missed and where they are not: their judgement takes a hundred times as long."""
 
 
@@ -259,21 +197,6 @@ def _law(t: Trial, entry: Mapping[str, Any]) -> Mapping[str, Any]:
 
 def _is_new(problem: Problem, remedy: Remedy) -> bool:
     return rewritten(problem.text, remedy.entry) != rewritten(problem.text, {})
-
-
-def _tried(problem: Problem, remedy: Remedy) -> bool:
-    """Return whether the judge lets the whole changed scenario pass, on the robot of the problem."""
-    try:
-        text = rewritten(problem.text, remedy.entry)
-        changed = resolve(parse_scenario(text, "remedy"), problem.law.robot)
-        if not np.array_equal(changed.plant, problem.plant):
-            changed = altered(changed, plant=problem.law.robot.layout.unpack(problem.plant))
-        if require_sampled(changed).allow_unstable:  # then it is the fallback that has to hold
-            alone = judged_fallback(changed)
-            return alone is None or alone.stable
-        return holds(changed, native=False)
-    except PassiflexError:
-        return False
 
 
 def _least(

@@ -20,9 +20,9 @@ from passiflex.passivity import Audit, audit, port_tank
 from passiflex.plotting.figures import save_figure
 from passiflex.plotting.sampled import SampledPanel, draw_sampled
 from passiflex.reports import write_report
-from passiflex.scenarios.control_settings import MotorSettings
 from passiflex.scenarios.environment import Drag
 from passiflex.scenarios.law_settings import ImpedanceSettings
+from passiflex.scenarios.motor_settings import MotorSettings
 from passiflex.scenarios.reference import Circle
 from passiflex.scenarios.tank_settings import TankSettings
 from passiflex.simulation import Problem, Run, Scenario, resolve, simulate_problem
