@@ -216,7 +216,7 @@ U01 = "{distribution: uniform, low: 0, high: 1}"
         ("control.missed: {distribution: choice, values: [0, 95 %]}", "column 54, parameters.'control.missed'.values[1]: expected one number, ≥ 0, ≤ 0.9; got 0.95 (too large)"),
         ("model_errors.joint_stiffness: {distribution: normal, mean: 0, deviation: 20 %}", "column 33, parameters.'model_errors.joint_stiffness': has no end below, and the scenario takes numbers > -1 only; give `low: …`"),
         ("control.missed: {distribution: normal, mean: 0.1, deviation: 20 %, low: 0}", "column 19, parameters.'control.missed': has no end above, and the scenario takes numbers ≤ 0.9 only; give `high: …`"),
-        ("control.delay: {distribution: uniform, low: 0, high: 30 ms}", "column 56, parameters.'control.delay'.high: no scenario with this value: control.delay: delay and jitter together are at most 20 periods; got 30 periods"),
+        ("control.delay: {distribution: uniform, low: 0, high: 30 ms}", "column 56, parameters.'control.delay'.high: no scenario with this value: control.delay: delay and jitter together are at most 20 periods with the matched inner loop; got 30 periods"),
         ("tank.floor: {distribution: uniform, low: 0, high: 2}", "column 15, parameters.'tank.floor': with every parameter at its median: tank.low: needs more than the floor of 1 J; got 0.2 J"),
     ],
 )  # fmt: skip

@@ -195,7 +195,7 @@ def test_a_scenario_in_continuous_time_needs_a_rate(
         (["--rate", "fast"], "passiflex: rate; got 'fast'; needs Hz, one number, > 0"),
         (["--rate", "0"], "passiflex: rate; got '0'"),
         (["--delay", "1 m"], "passiflex: delay; got '1 m'"),
-        (["--delay", "1 s"], "passiflex: delay of a command; got 1 s; needs 0 to 20 periods"),
+        (["--delay", "1 s"], "passiflex: delay of a command; got 1 s; needs 0 to 60 periods"),
     ],
 )
 def test_what_makes_no_sense_ends_with_2_and_one_line(

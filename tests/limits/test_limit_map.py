@@ -262,7 +262,7 @@ def test_what_runs_in_continuous_time_needs_a_rate() -> None:
         ({"rate": 2e6}, "rate; got 2000000.0"),
         ({"delay": -1}, "delay; got -1; needs s, one number, ≥ 0"),
         ({"delay": float("nan")}, "delay; got nan"),
-        ({"delay": 1.0}, "delay of a command; got 1 s; needs 0 to 20 periods"),
+        ({"delay": 1.0}, "delay of a command; got 1 s; needs 0 to 60 periods"),
     ],
 )
 def test_a_rate_or_delay_that_makes_no_sense_is_refused(told: dict[str, Any], message: str) -> None:

@@ -152,7 +152,8 @@ def test_the_resolved_scenario_loads_to_an_equal_one(text: str) -> None:
     assert Scenario(**{name: getattr(s, name) for name in Scenario.model_fields}) == s
 
 
-PERIODS = "delay and jitter together are at most 20 periods"
+PERIODS = "delay and jitter together are at most 60 periods"
+PREDICTED = "delay and jitter together are at most 20 periods with the matched inner loop"
 ONLY = "needs `control`: only a sampled run has it"
 
 
@@ -167,8 +168,9 @@ ONLY = "needs `control`: only a sampled run has it"
         ("rate: 2 kHz, ", "", "line 12, column 10, control.rate: missing: control rate, Hz"),
         ("0.75 ms", "-1 ms", "line 12, column 31, control.delay: expected s, one number, ≥ 0; got '-1 ms' (too small)"),
         ("0.75 ms", "31 ms", f"line 12, column 31, control.delay: {PERIODS}; got 62 periods"),
-        ("delay: 0.75 ms", "jitter: 12 ms", f"line 12, column 32, control.jitter: {PERIODS}; got 24 periods"),
-        ("0.75 ms", "9 ms, jitter: 2 ms", f"line 12, column 31, control.delay: {PERIODS}; got 22 periods"),
+        ("delay: 0.75 ms", "jitter: 31 ms", f"line 12, column 32, control.jitter: {PERIODS}; got 62 periods"),
+        ("0.75 ms", "29 ms, jitter: 2 ms", f"line 12, column 31, control.delay: {PERIODS}; got 62 periods"),
+        ("0.75 ms", "9 ms, jitter: 2 ms, inner_loop: matched", f"line 12, column 31, control.delay: {PREDICTED}; got 22 periods"),
         ("0.75 ms", "0, jitter: -1", "line 12, column 42, control.jitter: expected s, one number, ≥ 0; got -1 (too small)"),
         ("0.75 ms", "0, missed: 95 %", "line 12, column 42, control.missed: expected one number, ≥ 0, ≤ 0.9; got '95 %' (too large)"),
         ("0.75 ms", "0, inner_loop: mached", "line 12, column 46, control.inner_loop: unknown word 'mached'; try 'matched'"),

@@ -88,7 +88,7 @@ def by_hand(K_e: float, B_e: float, delay: float) -> np.ndarray:
     return np.linalg.eigvals(out)
 
 
-@pytest.mark.parametrize("delay", [0.0, 0.5e-3, 1e-3, 1.5e-3])
+@pytest.mark.parametrize("delay", [0.0, 0.5e-3, 1e-3, 1.5e-3, 40.5e-3])
 @pytest.mark.parametrize(("K_ratio", "B_ratio"), [(1, 0.5), (1, 0.03), (0.4, 0.1), (5, 0.2)])
 def test_one_joint_has_the_eigenvalues_worked_out_by_hand(
     K_ratio: float, B_ratio: float, delay: float

@@ -15,7 +15,7 @@ from passiflex.control.motion import rebased
 from passiflex.control.posture import posture
 from passiflex.errors import NameUnknownError, ValueRangeError
 from passiflex.problems.problem import FROM_THE_START, Problem, SampledProblem, require_sampled
-from passiflex.scenarios.control_settings import MOST_PERIODS
+from passiflex.scenarios.control_settings import MOST_PERIODS, MOST_PREDICTED
 from passiflex.scenarios.scenario import Scenario
 from passiflex.scenarios.scenario_file import parse_scenario
 from passiflex.texts.yaml_tree import read_back
@@ -58,7 +58,8 @@ def altered(
         For a problem in continuous time, a rate or delay that makes no sense, gains or numbers that do not fit.
     """
     s, law = require_sampled(problem), problem.law
-    period, late = require_timing(s.period, s.delay, rate, delay)
+    most = MOST_PREDICTED if s.controller.inner.predicts else MOST_PERIODS
+    period, late = require_timing(s.period, s.delay, rate, delay, most)
     own = law.layout.unpack(s.gains)
     for name in gains or {}:
         if name not in own or name not in GAINS:
@@ -144,9 +145,9 @@ def with_flange(problem: SampledProblem, inertia: float) -> SampledProblem:
 
 
 def require_timing(
-    period: float, own_delay: float, rate: float | None, delay: float | None
+    period: float, own_delay: float, rate: float | None, delay: float | None, most: int = MOST_PERIODS
 ) -> tuple[float, float]:
-    """Return period and delay [s]: the first two, or what is given in their place.
+    """Return period and delay [s]: the first two, or what is given in their place; of so many periods at most.
 
     Raises
     ------
@@ -159,11 +160,11 @@ def require_timing(
         )
     period = period if rate is None else 1 / rate
     late = own_delay if delay is None else delay
-    if not 0 <= late <= MOST_PERIODS * period * (1 + 1e-9):
+    if not 0 <= late <= most * period * (1 + 1e-9):
         raise ValueRangeError(
             "delay of a command",
             got=f"{late:g} s",
-            needs=f"0 to {MOST_PERIODS} periods, {MOST_PERIODS * period:g} s at this rate",
+            needs=f"0 to {most} periods, {most * period:g} s at this rate",
         )
     return period, late
 
