@@ -32,6 +32,9 @@ LEVELS |= {"fill": 1.0, "braking": 100.0}
 OFF = {
     "follow_velocity": 0.0,
     "follow_acceleration": 0.0,
+    "coulomb_compensation": 0.0,
+    "viscous_compensation": 0.0,
+    "compensation_width": 1.0,
     "posture_stiffness": 0.0,
     "posture_damping": 0.0,
     "posture": 0.3,

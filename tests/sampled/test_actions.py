@@ -279,4 +279,7 @@ def test_the_layout_has_a_switch_for_each_action() -> None:
         "posture": 5,
         "follow_velocity": 1,
         "follow_acceleration": 1,
+        "coulomb_compensation": 5,
+        "viscous_compensation": 5,
+        "compensation_width": 1,
     }

@@ -151,7 +151,15 @@ class PeriodLaw:
             Signal(Field("reference_share", (), "1", "γ of the reference"), entry.reference_share),
             Signal(Field("stiffness_share", (), "1", "γ of the stiffness"), entry.stiffness_share),
             Signal(Field("valve", (), "1", "β"), entry.valve),
+            *self._compensated(result),
         )
+
+    def _compensated(self, result: PeriodResult) -> tuple[Signal, ...]:
+        """Return what is given against friction, where anything acts that the valve gates."""
+        if not self.controller.actions:
+            return ()
+        power = cs.dot(result.compensation, result.believed.dtheta)
+        return (Signal(Field("compensation_power", (), "W", "given against friction, as it is read"), power),)
 
     def function(self, told: Layout) -> cs.Function:
         """Return (y, c, told, p) → (c, command, signals), with y as `measurement` and p as `parameters`."""

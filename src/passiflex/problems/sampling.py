@@ -173,6 +173,13 @@ def _actions(
         "posture": posture,
         "follow_velocity": actions.follow_velocity,
         "follow_acceleration": actions.follow_acceleration,
+        "coulomb_compensation": per_joint(
+            robot, "actions.coulomb_compensation", actions.coulomb_compensation
+        ),
+        "viscous_compensation": per_joint(
+            robot, "actions.viscous_compensation", actions.viscous_compensation
+        ),
+        "compensation_width": actions.compensation_width,
     }
 
 

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import casadi as cs
 
+from passiflex.control.law import AbstractLaw, Gains, Stored
 from passiflex.control.null_space import inverse_cartesian_inertia
+from passiflex.control.signals import Measurement
 from passiflex.layout import Field, Layout
 from passiflex.robots.linear_algebra import solve_spd
+
+if TYPE_CHECKING:
+    from passiflex.sampled.period import Granted
+    from passiflex.sampled.signals import ControlParameters, Setpoint
 
 FARTHEST = 1.0
 """Most that the error of the end effector is taken to have moved the joints [rad], near a singular posture too."""
@@ -22,6 +28,9 @@ class ActionNumbers(Protocol):
     posture: cs.SX
     follow_velocity: cs.SX
     follow_acceleration: cs.SX
+    coulomb_compensation: cs.SX
+    viscous_compensation: cs.SX
+    compensation_width: cs.SX
 
 
 def action_layout(n: int) -> Layout:
@@ -33,6 +42,9 @@ def action_layout(n: int) -> Layout:
             Field("posture", (n,), "rad", "where that spring pulls the shaped motors to"),
             Field("follow_velocity", (), "1", "share of D_x ẋ_d that is fed forward"),
             Field("follow_acceleration", (), "1", "share of Λ ẍ_d that is fed forward"),
+            Field("coulomb_compensation", (n,), "N m", "dry friction that is made up for"),
+            Field("viscous_compensation", (n,), "N m s/rad", "viscous friction that is made up for"),
+            Field("compensation_width", (), "rad/s", "speed over which the first changes its sign"),
         ),
         ActionNumbers,
     )
@@ -86,3 +98,37 @@ def tracking_wrench(
     return a.follow_velocity * (damping @ velocity) + a.follow_acceleration * solve_spd(
         mobility, acceleration
     )
+
+
+def friction_compensation(dtheta: cs.SX, a: ActionNumbers) -> cs.SX:
+    """Return c tanh(θ̇/w) + v θ̇ [N m], on the motors: what friction of that size takes, if they move.
+
+    It gives power, always. Where friction takes less, what is left makes the motor move on by itself.
+    """
+    dry = a.coulomb_compensation * cs.tanh(dtheta / a.compensation_width)
+    return dry + a.viscous_compensation * dtheta
+
+
+def gated_torque(
+    law: AbstractLaw,
+    y: Measurement,
+    now: Stored,
+    setpoint: Setpoint,
+    granted: Granted,
+    g: Gains,
+    p: ControlParameters,
+) -> cs.SX:
+    """Return the torque on the shaped motors of what only the tank's valve lets through (n,) N m."""
+    arm, rows = law.robot.arm, slice(0, law.task.size)
+    S, held, a = law.task.basis(granted.pose), list(law.task.held), p.actions
+    M, J = arm.mass_matrix(y.q, p.model), S.T @ arm.jacobian(y.q, p.model)[rows, :]
+    velocity, acceleration = S.T @ setpoint.velocity[rows], S.T @ setpoint.acceleration[rows]
+    follow = granted.pose_share * tracking_wrench(
+        M, J, g.damping[held, held], velocity, acceleration, g.regularisation, a
+    )
+    at_end = arm.jacobian(now.phi, p.model)
+    J_held = S.T @ at_end[rows, :]
+    moving = M + cs.diag(law.motors(p.model, g))
+    error = S.T @ law.task.error(now.pose, granted.pose)
+    posture = posture_spring(moving, J_held, error, now.phi, now.dphi, g.regularisation, a)
+    return at_end.T @ setpoint.wrench + J_held.T @ follow + posture

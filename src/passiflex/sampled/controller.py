@@ -14,7 +14,7 @@ from passiflex.control.signals import Command, Measurement, Reference
 from passiflex.layout import Field, Layout
 from passiflex.parts import Parts
 from passiflex.robots.arm import EndEffectorPose
-from passiflex.sampled.actions import action_layout, posture_spring, tracking_wrench
+from passiflex.sampled.actions import action_layout, friction_compensation, gated_torque
 from passiflex.sampled.external import AbstractExternalTorque, Known, TrueTorque
 from passiflex.sampled.governor import govern_pose, govern_stiffness
 from passiflex.sampled.held_task import HeldTask
@@ -25,7 +25,7 @@ from passiflex.sampled.measurement_bound import (
     error_layout,
     sure_state,
 )
-from passiflex.sampled.period import Force, Granted, Read, Settled
+from passiflex.sampled.period import Commanded, Force, Granted, Read, Settled
 from passiflex.sampled.period_state import period_after, period_start, period_state
 from passiflex.sampled.rest import Remembered, Rest
 from passiflex.sampled.signals import ControlParameters, LedgerEntry, ObserverNumbers, PeriodResult, Setpoint
@@ -78,15 +78,23 @@ class SampledController:
         """Return what is remembered from one period to the next; energies are sums since the start."""
         n, k = self.law.robot.n, self.law.task.size
         books = period_state(n, k) + bound_state(n) + sure_state(n)
-        own = books + self.external.state(n) + self.inner.state(n)
-        return own + self.held_task.state(n) if self.held_task else own
+        return books + self.external.state(n) + self.inner.state(n) + self._of_the_command
+
+    @property
+    def _of_the_command(self) -> Layout:
+        """Return what is remembered of a command."""
+        n = self.law.robot.n
+        given = Field("compensation", (n,), "N m", "against friction", kept=False, acts=True)
+        held = self.held_task.state(n) if self.held_task else Layout(())
+        return Layout((given,)) + held if self.actions else held
 
     def start(self, at: Rest) -> Remembered:
         """Return what is remembered at rest, of each field of the state."""
         n, k = self.law.robot.n, self.law.task.size
         bounds = (bound_state(n) + sure_state(n)).zeros()
         held = self.held_task.start(at) if self.held_task else {}
-        return period_start(n, k, at) | bounds | self.external.start(at) | self.inner.start(at) | held
+        command = self._of_the_command.zeros() | held
+        return period_start(n, k, at) | bounds | self.external.start(at) | self.inner.start(at) | command
 
     def step(
         self,
@@ -106,7 +114,7 @@ class SampledController:
         read = self._read(y, applied, elapsed, s, p)
         force = self._in_force(read, self._settle(read, s, p), s, p)
         granted = self._grant(read, force, setpoint, p)
-        command, valve, kept = self._command(read, force, granted, setpoint, s, p)
+        command, valve, compensation, kept = self._command(read, force, granted, setpoint, s, p)
         variable = self._potential(force.now, granted.pose, granted.stiffness - p.gains.stiffness)
         asked, floor = setpoint.pose.position, p.tank.tank_floor
         values = period_after(read, force, granted, asked, command, variable, floor, s)
@@ -126,7 +134,7 @@ class SampledController:
             bound=read.bound.total,
             fault=1 - ok,
         )
-        return PeriodResult(safe, cs.if_else(ok, after, faulty), entry, read.y)
+        return PeriodResult(safe, cs.if_else(ok, after, faulty), entry, read.y, compensation)
 
     def _read(
         self,
@@ -140,7 +148,8 @@ class SampledController:
         elapsed = s.lost_time + cs.if_else(finite(elapsed, below=LARGEST_READING), elapsed, 0)
         known = Known(self.law.robot.arm, p.model, p.observer.bandwidth)
         y, observed = self.external.estimate(y, elapsed, known, s)
-        y, seen = self.inner.see(y, applied, elapsed, s, p.model, p.inner)
+        moving = applied - s.compensation if self.actions else applied  # the rest is what friction takes
+        y, seen = self.inner.see(y, moving, elapsed, s, p.model, p.inner)
         first = s.running < 1
         return Read(y, elapsed, first, observed, seen, booked_bound(y, elapsed, first, s, p.errors))
 
@@ -198,16 +207,17 @@ class SampledController:
         setpoint: Setpoint,
         s: Any,
         p: ControlParameters,
-    ) -> tuple[Command, cs.SX, cs.SX]:
-        """Return the law's command with what the valve lets through, the valve, and what is remembered of the task."""
+    ) -> Commanded:
+        """Return the law's command with what the valve lets through."""
         level = granted.entry.level
         valve = (1 - f.latched) * self.tank.valve(level - f.doubt, p.tank) if self.tank else cs.SX(1)
         g = f.gains
         g.stiffness = granted.stiffness
         g.damping = cs.if_else(f.latched, p.fallback.damping, setpoint.damping)
-        torque = cs.SX.zeros(self.law.robot.n)
+        torque = against = cs.SX.zeros(self.law.robot.n)
         if self.actions:
-            torque += valve * self._actions(r.y, f.now, setpoint, granted, g, p)
+            torque += valve * gated_torque(self.law, r.y, f.now, setpoint, granted, g, p)
+            against = valve * friction_compensation(r.y.dtheta, p.actions)
         if self.tank:
             torque -= self.tank.braking(level, cs.dot(f.now.dphi, f.now.dphi), r.elapsed, p.tank) * f.now.dphi
         reference, memory = Reference(granted.pose, setpoint.velocity), self.inner.state(self.law.robot.n)
@@ -217,14 +227,17 @@ class SampledController:
                 self.law, r.y, reference, p.model, g, added, memory.view(r.seen), p.inner
             )
 
-        command = commanded(torque)
-        if self.held_task is None:
-            return command, valve, cs.SX(0, 1)
-        due = self.held_task.due(r.first, r.elapsed, s, p.inner)
-        runs = cs.logic_or(due.now, f.latched > s.latched)
-        held = cs.if_else(runs, command.tau_u, s.task_torque)
-        kept = self.held_task.state(self.law.robot.n).stack({"task_torque": held, "task_age": due.age})
-        return commanded(torque + held - command.tau_u), valve, kept
+        command, kept = commanded(torque), {"compensation": against}
+        if self.held_task is not None:
+            due = self.held_task.due(r.first, r.elapsed, s, p.inner)
+            runs = cs.logic_or(due.now, f.latched > s.latched)
+            held = cs.if_else(runs, command.tau_u, s.task_torque)
+            kept |= {"task_torque": held, "task_age": due.age}
+            command = commanded(torque + held - command.tau_u)
+        command = command._replace(tau_m=command.tau_m + against)
+        layout = self._of_the_command
+        memory = layout.stack({field.name: kept[field.name] for field in layout})
+        return Commanded(command, valve, against, memory)
 
     def _potential(self, at: Stored, reference: EndEffectorPose, stiffness: cs.SX) -> cs.SX:
         return self.law.potential(at, reference, stiffness)
@@ -256,30 +269,6 @@ class SampledController:
             cost=stiffness.cost + pose.cost,
             entry=added(first, second),
         )
-
-    def _actions(
-        self,
-        y: Measurement,
-        now: Stored,
-        setpoint: Setpoint,
-        granted: Granted,
-        g: Gains,
-        p: ControlParameters,
-    ) -> cs.SX:
-        """Return the torque of everything that only the tank's valve lets through (n,) N m."""
-        arm, rows = self.law.robot.arm, slice(0, self.law.task.size)
-        S, held, a = self.law.task.basis(granted.pose), list(self.law.task.held), p.actions
-        M, J = arm.mass_matrix(y.q, p.model), S.T @ arm.jacobian(y.q, p.model)[rows, :]
-        velocity, acceleration = S.T @ setpoint.velocity[rows], S.T @ setpoint.acceleration[rows]
-        follow = granted.pose_share * tracking_wrench(
-            M, J, g.damping[held, held], velocity, acceleration, g.regularisation, a
-        )
-        at_end = arm.jacobian(now.phi, p.model)
-        J_held = S.T @ at_end[rows, :]
-        moving = M + cs.diag(self.law.motors(p.model, g))
-        error = S.T @ self.law.task.error(now.pose, granted.pose)
-        posture = posture_spring(moving, J_held, error, now.phi, now.dphi, g.regularisation, a)
-        return at_end.T @ setpoint.wrench + J_held.T @ follow + posture
 
 
 def _chosen(flag: cs.SX, then: Gains, other: Gains) -> Gains:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import casadi as cs
 
 from passiflex.control.law import Gains, Stored
-from passiflex.control.signals import Measurement
+from passiflex.control.signals import Command, Measurement
 from passiflex.robots.arm import EndEffectorPose
 from passiflex.sampled.measurement_bound import Bound
 from passiflex.sampled.tank import TankEntry
@@ -47,6 +47,20 @@ class Force(NamedTuple):
     lowest: cs.SX
     work: cs.SX
     doubt: cs.SX
+
+
+class Commanded(NamedTuple):
+    """The command, how far the valve is open, and what is remembered of it.
+
+    Attributes
+    ----------
+    compensation: Its part against friction (n,) N m.
+    """
+
+    command: Command
+    valve: cs.SX
+    compensation: cs.SX
+    memory: cs.SX
 
 
 class Granted(NamedTuple):

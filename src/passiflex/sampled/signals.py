@@ -66,12 +66,18 @@ class LedgerEntry(NamedTuple):
 
 
 class PeriodResult(NamedTuple):
-    """Command, next state (flat) and ledger entry of one period, and the measurement as the law believed it."""
+    """Command, next state (flat) and ledger entry of one period, and the measurement as the law believed it.
+
+    Attributes
+    ----------
+    compensation: What of the command is there against friction (n,) N m.
+    """
 
     command: Command
     state: cs.SX
     entry: LedgerEntry
     believed: Measurement
+    compensation: cs.SX
 
 
 class ObserverNumbers(Protocol):

@@ -27,6 +27,15 @@ class Actions(Section):
     )
     follow_velocity: Share = Field(default=0.0, description="share of D_x ẋ_d that is fed forward, 0 to 1")
     follow_acceleration: Share = Field(default=0.0, description="share of Λ ẍ_d that is fed forward, 0 to 1")
+    coulomb_compensation: Annotated[float | Vector, Quantity("N m", PerJoint, least=0)] = Field(
+        default=0.0, description="dry friction of the motors that is made up for, one number or one each, N m"
+    )
+    viscous_compensation: Annotated[float | Vector, Quantity("N m s/rad", PerJoint, least=0)] = Field(
+        default=0.0, description="viscous friction that is made up for, one number or one each, N m s/rad"
+    )
+    compensation_width: Annotated[float, Quantity("rad/s", above=0)] = Field(
+        default=0.01, description="speed over which the former changes its sign, rad/s"
+    )
 
 
 class Feedforward(TimeSpan):

@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 from passiflex.problems.problem import Problem
 from passiflex.simulation.book_cautions import book_cautions
+from passiflex.simulation.friction_cautions import much_compensation
 from passiflex.simulation.jump_cautions import far_jumps
 from passiflex.simulation.stability_cautions import stability_cautions
 from passiflex.simulation.start_cautions import singular_start
@@ -17,6 +18,7 @@ CAUTIONS: tuple[Callable[[Problem], tuple[str, ...]], ...] = (
     far_jumps,
     far_turns,
     large_moments,
+    much_compensation,
     book_cautions,
 )
 """Who is asked, in the order in which the lines are printed."""

@@ -14,7 +14,7 @@ from passiflex.stability.clock_words import counted, delay_words, hertz
 from passiflex.stability.judgement import Judgement
 from passiflex.stability.linear_loop import LinearLoop
 from passiflex.stability.modes import self_motions
-from passiflex.stability.remedies import TOOL, remedies
+from passiflex.stability.remedies import TOOL, remedies, without_compensation
 from passiflex.stability.remedy import Remedy
 from passiflex.stability.trial import Change, Trial
 
@@ -100,6 +100,8 @@ def _reasons(t: Trial) -> Iterator[str]:
             if stiff.any()
             else ("a self-motion that the task does not see")
         )
+    if _compensation(t).any() and LinearLoop(without_compensation(s), native=False).radius(delay=late) < 1:
+        yield "viscous friction is made up for that the motors do not have"
     if _bare_flange(t):
         yield f"a light last body swings against motor {joint}; with {TOOL:g} kg m² more on the flange it holds"
     if t.shapes and not np.allclose(gains["shaped_stiffness"], t.own_stiffness):
@@ -151,5 +153,5 @@ def _bare_flange(t: Trial) -> bool:
     return t.found.part == "law" and heavier.radius(delay=t.found.delay) < 1
 
 
-def _actions(loop: LinearLoop) -> np.ndarray:
-    return loop.problem.numbers[loop.parts.slices["actions"]]
+def _compensation(t: Trial) -> np.ndarray:
+    return t.loop.parts.unpack("actions", t.loop.problem.numbers)["viscous_compensation"]

@@ -28,6 +28,7 @@ IDEAL = {
     "torque_limit": UNLIMITED_TORQUE,
     "torque_rate_limit": UNLIMITED_TORQUE,
     "coulomb_friction": 0.0,
+    "coulomb_compensation": 0.0,
 }
 """What has no linear approximation is left out, and constants."""
 KEPT = 8

@@ -172,7 +172,7 @@ class LinearLoop:
 
     def without_actions(self) -> LinearLoop:
         """Return the loop with the tank's valve shut."""
-        still = {"posture_stiffness": np.zeros(self.n)}
+        still = {name: np.zeros(self.n) for name in ("posture_stiffness", "viscous_compensation")}
         return LinearLoop(self.problem.with_numbers(still, "actions"), self.at, native=self.native)
 
     def fallback(self) -> dict[str, Array]:

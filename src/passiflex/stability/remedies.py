@@ -10,8 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from passiflex.problems.altered import rewritten, with_flange
-from passiflex.problems.problem import Problem
-from passiflex.stability.clock_remedies import faster, faster_task, fewer_missed, sooner, without_jitter
+from passiflex.problems.problem import Problem, SampledProblem
+from passiflex.stability.clock_remedies import (
+    SHARES,
+    faster,
+    faster_task,
+    fewer_missed,
+    sooner,
+    without_jitter,
+)
 from passiflex.stability.judgement import Judgement, holds
 from passiflex.stability.remedy import INSIDE, Remedy, tried
 from passiflex.stability.trial import Change, Trial
@@ -164,6 +171,25 @@ def _self_motion(t: Trial) -> Iterator[Remedy]:
             return
 
 
+def _less_compensation(t: Trial) -> Iterator[Remedy]:
+    """Yield less of the viscous friction that the actions make up for."""
+    own = t.loop.parts.unpack("actions", t.loop.problem.numbers)["viscous_compensation"]
+    for share in SHARES if own.any() and t.found.part != "fallback" else ():
+        remedy = Remedy(
+            f"actions.viscous_compensation times {share:g}",
+            {"actions": {"viscous_compensation": (share * own).tolist()}},
+        )
+        if tried(t.problem, remedy):
+            yield remedy
+            return
+
+
+def without_compensation(problem: SampledProblem) -> SampledProblem:
+    """Return the problem without the actions against viscous friction."""
+    none = np.zeros(problem.law.robot.n)
+    return problem.with_numbers({"viscous_compensation": none}, "actions")
+
+
 def _as_the_law(t: Trial) -> Iterator[Remedy]:
     """Yield a fallback that is shaped as the law is, which holds if that law does."""
     if t.found.part != "fallback" or not t.shapes or t.loop.problem.allow_unstable:
@@ -184,8 +210,8 @@ def _other_loop(t: Trial) -> Iterator[Remedy]:
 
 
 FAST = (
-    without_jitter, faster_task, _inertia, _unshaped, _damping, _stiffness, _softer, _as_the_law, _self_motion, faster,
-    sooner, _other_loop,
+    without_jitter, faster_task, _less_compensation, _inertia, _unshaped, _damping, _stiffness, _softer, _as_the_law,
+    _self_motion, faster, sooner, _other_loop,
 )  # fmt: skip
 LOST = (fewer_missed, _inertia, _other_loop)
 """What is tried, where periods are missed and where they are not: their judgement takes a hundred times as long."""

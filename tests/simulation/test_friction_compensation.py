@@ -1,0 +1,117 @@
+"""Friction that is made up for behind the tank's valve: what it gives, what too much of it does, and who says so."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import casadi as cs
+import numpy as np
+import pytest
+
+from passiflex.errors import SizeError, UnstableLoopError
+from passiflex.passivity import audit
+from passiflex.sampled.actions import action_layout, friction_compensation
+from passiflex.simulation import Run, parse_scenario, resolve, simulate
+from passiflex.simulation.cautions import cautions
+from worlds import books, ran, world
+
+FRICTION: dict[str, Any] = {"coulomb_friction": 3, "viscous_friction": 5, "friction_width": 0.05}
+EQUAL: dict[str, Any] = {"coulomb_compensation": 3, "viscous_compensation": 5, "compensation_width": 0.05}
+
+
+def sticking(compensated: float, **changes: Any) -> Run:
+    """Return a run with 2 N m of friction that sticks, and this much made up for."""
+    motors = {"coulomb_friction": 2, "friction": "sticks"}
+    actions = {"coulomb_compensation": compensated, "compensation_width": 0.02}
+    return ran(duration=2.0, motors=motors, actions=actions, **changes)
+
+
+def test_what_it_gives_is_what_friction_of_that_size_takes() -> None:
+    numbers = action_layout(2).symbols("a")[1]
+    dtheta = cs.SX.sym("dtheta", 2)
+    given = friction_compensation(dtheta, numbers)
+    names = ("coulomb_compensation", "viscous_compensation", "compensation_width")
+    f = cs.Function("f", [dtheta, *(getattr(numbers, n) for n in names)], [given])
+    speeds = np.array([0.3, -0.02])
+    torque = np.asarray(f(speeds, [3, 1], [5, 0], 0.05)).ravel()
+    np.testing.assert_allclose(torque, [3 * np.tanh(6) + 1.5, -np.tanh(0.4)], rtol=1e-14)
+
+
+@pytest.mark.parametrize("inner", ["plain", "matched"])
+def test_a_motor_moves_as_if_it_had_no_friction(inner: str) -> None:
+    """Up to the hold: it is half a period late, so that the difference halves with the period."""
+    off = []
+    for rate in (1000, 2000):
+        how: dict[str, Any] = {
+            "control": {"rate": rate, "inner_loop": inner, "external_torque": "none"},
+            "law": {"shaped_inertia": {"ratio": 0.5}},
+            "output_interval": 0.005,
+        }
+        free, rough = ran(**how), ran(**how, motors=FRICTION)
+        run = ran(**how, motors=FRICTION, actions=EQUAL)
+        off.append(np.abs(run["q"] - free["q"]).max())
+        assert off[-1] < 0.02 * np.abs(rough["q"] - free["q"]).max()
+        assert np.ptp(books(run)) < 1e-12
+    assert off[1] == pytest.approx(off[0] / 2, rel=0.15)
+
+
+def test_its_power_is_that_of_the_friction() -> None:
+    run = ran(motors=FRICTION, actions=EQUAL, output_interval=0.001)
+    given = np.sum(run["compensation_power"][:-1]) * 1e-3
+    assert given == pytest.approx(run["friction_energy"][-1], rel=0.01)
+
+
+def test_it_leaves_a_third_of_the_steady_error_of_friction_that_sticks() -> None:
+    """None of it while nothing moves: c tanh(θ̇/w) has no part at rest."""
+    errors = [np.linalg.norm((r["position"] - r["desired_position"])[-1]) for r in (sticking(0), sticking(2))]
+    assert errors[0] > 0.01
+    assert errors[1] < errors[0] / 3
+
+
+@pytest.mark.parametrize("damping", [5, 40])
+@pytest.mark.parametrize("compensated", [4, 8])
+def test_too_much_of_it_never_rests_and_a_tank_throttles_it(compensated: float, damping: float) -> None:
+    """More power than friction takes comes from it; with little in the tank the valve closes on the difference."""
+    law = {"damping": {"translation": damping}}
+    rich = sticking(compensated, law=law, tank={"initial": 50.0, "cap": 60.0})
+    assert np.abs(rich["dq"][-200:]).max() > 1
+    assert rich["compensation_power"].mean() > 1.5 * rich["friction_energy"][-1] / 2.0
+    poor = sticking(compensated, law=law, tank={"initial": 0.3})
+    assert poor["valve"].min() < 1e-6
+    assert poor["compensation_power"][-500:].mean() < 0.5 * rich["compensation_power"][-500:].mean()
+    for run in (rich, poor):
+        assert audit(run).verdict == "passive"
+        assert not run["latched"][-1]
+
+
+def test_more_than_the_motors_have_is_said_before_a_run() -> None:
+    motors = {"coulomb_friction": [2, 4]}
+    told = cautions(resolve(world(motors=motors, actions={"coulomb_compensation": 3})))
+    assert told == (
+        "actions make up for 3 N m of dry friction at joint 1, which has 2 N m: what is too much keeps it moving",
+    )
+    assert cautions(resolve(world(motors=motors, actions={"coulomb_compensation": [2, 4]}))) == ()
+
+
+def test_viscous_friction_that_is_not_there_is_refused_with_a_share_that_holds() -> None:
+    motors = {"viscous_friction": 1}
+    with pytest.raises(
+        UnstableLoopError, match="viscous friction is made up for that the motors do not have"
+    ) as e:
+        ran(motors=motors, actions={"viscous_compensation": 20})
+    offered = float(str(e.value).split("viscous_compensation times ")[1].split()[0].rstrip(";"))
+    assert audit(ran(motors=motors, actions={"viscous_compensation": 20 * offered})).verdict == "passive"
+
+
+def test_a_run_that_compensates_nothing_has_no_signal_of_it() -> None:
+    assert "compensation_power" not in simulate(world()).data
+
+
+def test_a_list_of_other_length_is_refused() -> None:
+    with pytest.raises(SizeError, match=r"actions\.coulomb_compensation"):
+        resolve(world(actions={"coulomb_compensation": [1, 2, 3]}))
+
+
+def test_it_is_read_back_from_its_own_text() -> None:
+    scenario = world(actions=EQUAL)
+    assert parse_scenario(scenario.to_yaml()) == scenario
