@@ -42,7 +42,21 @@ def test_flags_that_the_compiler_refuses_are_left_out(monkeypatch, tmp_path):
     wrapper.write_text(f'#!/bin/sh\ncase "$*" in *march*) exit 1;; esac\nexec {found.argv[0]} "$@"\n')
     wrapper.chmod(0o755)
     monkeypatch.setenv("CC", str(wrapper))
-    assert find_compiler().flags == compiler.FLAGS
+    assert find_compiler().flags[1:] == compiler.FLAGS
+
+
+@pytest.mark.parametrize(("level", "flag"), [("", "-O2"), ("1", "-O1"), ("3", "-O3")])
+def test_how_hard_it_tries_is_asked_for(monkeypatch, level, flag):
+    if find_compiler() is None:
+        pytest.skip("no compiler")
+    monkeypatch.setenv("PASSIFLEX_OPTIMISE", level)
+    assert find_compiler().flags[0] == flag
+
+
+def test_no_compiler_tries_that_hard(monkeypatch):
+    monkeypatch.setenv("PASSIFLEX_OPTIMISE", "fast")
+    with pytest.raises(NameUnknownError, match="PASSIFLEX_OPTIMISE; got 'fast'"):
+        find_compiler()
 
 
 def test_none_finds_none(monkeypatch):
@@ -65,7 +79,7 @@ def test_an_empty_path_leaves_zig_or_none(monkeypatch, tmp_path):
 
 def test_zig_asked_for_and_absent(monkeypatch):
     monkeypatch.setenv("PASSIFLEX_COMPILER", "zig")
-    monkeypatch.setattr(compiler, "_zig", lambda: None)
+    monkeypatch.setattr(compiler, "_zig", lambda level: None)
     compiler._find.cache_clear()
     with pytest.raises(CompilerError, match=r"passiflex\[zig\]"):
         find_compiler()

@@ -2,6 +2,7 @@
 
 The order is `$CC`, then `cc`, `gcc`, `clang` on the path, then the C compiler inside the package
 `ziglang` (the extra `passiflex[zig]`). `PASSIFLEX_COMPILER=none` looks for none; `=zig` takes that one.
+`PASSIFLEX_OPTIMISE` says how hard it tries, 2 unless given: with 1 code is there in half the time.
 """
 
 from __future__ import annotations
@@ -26,7 +27,6 @@ from passiflex.native import builder
 
 # Only what the header exports is visible: calls inside the library can then be inlined.
 FLAGS = (
-    "-O2",
     "-fPIC",
     "-dynamiclib" if sys.platform == "darwin" else "-shared",
     "-fno-math-errno",
@@ -34,6 +34,7 @@ FLAGS = (
     "-fvisibility=hidden",
     "-DGCC_HASCLASSVISIBILITY",
 )
+LEVELS = ("0", "1", "2", "3")
 SUFFIX = ".dylib" if sys.platform == "darwin" else ".so"
 PROBE = "double probe(double x) { return x + 1; }\n"
 _ZIG_MACHINES = {"amd64": "x86_64", "arm64": "aarch64", "i686": "x86", "ppc64le": "powerpc64le"}
@@ -52,7 +53,7 @@ class Compiler:
 
     argv: tuple[str, ...]
     identity: str
-    flags: tuple[str, ...] = FLAGS
+    flags: tuple[str, ...] = ("-O2", *FLAGS)
 
     def build(self, source: str, target: Path | None) -> None:
         """Compile a C text into the shared library `target`, whole or not at all; only try to, if that is None.
@@ -125,20 +126,23 @@ def find_compiler() -> Compiler | None:
     CompilerError
         If `$CC` is set and cannot compile, or zig was asked for and is not installed.
     NameUnknownError
-        If `PASSIFLEX_COMPILER` is neither "none" nor "zig".
+        If `PASSIFLEX_COMPILER` is neither "none" nor "zig", or `PASSIFLEX_OPTIMISE` is not 0 to 3.
     """
     env = os.environ
-    return _find(env.get("PASSIFLEX_COMPILER", ""), env.get("CC", ""), env.get("PATH", ""))
+    level = env.get("PASSIFLEX_OPTIMISE", "") or "2"
+    if level not in LEVELS:
+        raise NameUnknownError("PASSIFLEX_OPTIMISE", level, LEVELS)
+    return _find(env.get("PASSIFLEX_COMPILER", ""), env.get("CC", ""), env.get("PATH", ""), level)
 
 
 @functools.cache
-def _find(choice: str, cc: str, path: str) -> Compiler | None:
+def _find(choice: str, cc: str, path: str, level: str) -> Compiler | None:
     if choice not in ("", "none", "zig"):
         raise NameUnknownError("PASSIFLEX_COMPILER", choice, ("none", "zig"))
     if choice == "none" or os.name == "nt":
         return None
     if choice == "zig":
-        zig = _zig()
+        zig = _zig(level)
         if zig is None:
             raise CompilerError(
                 "PASSIFLEX_COMPILER=zig finds no zig",
@@ -148,7 +152,7 @@ def _find(choice: str, cc: str, path: str) -> Compiler | None:
         return zig
     if cc.strip():
         try:
-            return _system(tuple(shlex.split(cc)), path)
+            return _system(tuple(shlex.split(cc)), path, level)
         except (CompilerError, ValueError) as error:
             raise CompilerError(
                 "the compiler in $CC does not work",
@@ -159,13 +163,13 @@ def _find(choice: str, cc: str, path: str) -> Compiler | None:
     for name in ("cc", "gcc", "clang"):
         if shutil.which(name, path=path):
             try:
-                return _system((name,), path)
+                return _system((name,), path, level)
             except CompilerError:
                 continue
-    return _zig()
+    return _zig(level)
 
 
-def _system(argv: tuple[str, ...], path: str) -> Compiler:
+def _system(argv: tuple[str, ...], path: str, level: str) -> Compiler:
     """Return the compiler behind `argv`, with the flags that it was seen to accept."""
     where = shutil.which(argv[0], path=path)
     if where is None:
@@ -175,7 +179,8 @@ def _system(argv: tuple[str, ...], path: str) -> Compiler:
         [*argv, "--version"], capture_output=True, text=True, errors="replace", check=False
     )
     identity = f"{shlex.join(argv)}\n{version.stdout}"
-    for flags in ((*FLAGS, "-march=native"), FLAGS):
+    always = (f"-O{level}", *FLAGS)
+    for flags in ((*always, "-march=native"), always):
         compiler = Compiler(argv, identity, flags)
         try:
             compiler.build(PROBE, None)
@@ -186,7 +191,7 @@ def _system(argv: tuple[str, ...], path: str) -> Compiler:
     raise failure
 
 
-def _zig() -> Compiler | None:
+def _zig(level: str) -> Compiler | None:
     """Return the compiler of the package `ziglang`, or None where it is not installed."""
     if importlib.util.find_spec("ziglang") is None or not sys.platform.startswith(("linux", "darwin")):
         return None
@@ -196,4 +201,6 @@ def _zig() -> Compiler | None:
     else:
         target = f"{machine}-linux-{'gnu' if platform.libc_ver()[0] == 'glibc' else 'musl'}"
     argv = (sys.executable, "-m", "ziglang", "cc", "-target", target, "-mcpu=native")
-    return Compiler(argv, f"{shlex.join(argv)}\nziglang {importlib.metadata.version('ziglang')}")
+    return Compiler(
+        argv, f"{shlex.join(argv)}\nziglang {importlib.metadata.version('ziglang')}", (f"-O{level}", *FLAGS)
+    )
