@@ -9,7 +9,7 @@ from typing import Any, ClassVar, NamedTuple, final
 
 import casadi as cs
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from passiflex.control.motion import Pose
 from passiflex.elements.bristle import slipping
@@ -141,6 +141,13 @@ class Surface(AbstractLabelled):
                     needs="a start outside; a surface that is moved may come to the hand",
                     try_=f"a place {1e3 * depth:.3g} mm or more along [{way}]",
                 )
+
+    def depths(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return how deep points (k, 3) [m] in world axes are within it (k,), before it moves; negative outside."""
+        g = self._own(SimpleNamespace(**self.numbers(0)), self.parameters(0))
+        sizes = {name: cs.SX(float(getattr(g, name))) for name in self.shape.sizes}
+        local = (points - np.asarray(g.place)) @ np.asarray(g.axes)
+        return np.array([-float(cs.evalf(self.shape.nearest(cs.SX(p), sizes).distance)) for p in local])
 
     def act(self, at: Touch, s: Any, m: Any) -> Effect:
         """Return force and moment at the end effector, summed over the points."""

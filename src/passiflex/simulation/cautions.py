@@ -9,12 +9,13 @@ from passiflex.simulation.book_cautions import book_cautions
 from passiflex.simulation.friction_cautions import much_compensation
 from passiflex.simulation.jump_cautions import far_jumps
 from passiflex.simulation.stability_cautions import stability_cautions
-from passiflex.simulation.start_cautions import singular_start
+from passiflex.simulation.start_cautions import singular_start, swallowed_joints
 from passiflex.simulation.turn_cautions import far_turns, large_moments
 
 CAUTIONS: tuple[Callable[[Problem], tuple[str, ...]], ...] = (
     stability_cautions,
     singular_start,
+    swallowed_joints,
     far_jumps,
     far_turns,
     large_moments,

@@ -1,4 +1,4 @@
-"""What is said before a run about a start in which the end effector cannot move in all directions that are held."""
+"""What is said before a run about its start: directions that are lost there, and joints within what is around."""
 
 from __future__ import annotations
 
@@ -6,9 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from passiflex.control.posture import lost_directions, posture
+from passiflex.elements.surface import Surface
 from passiflex.problems.problem import Problem
+from passiflex.robots.frames import world_frames
 
 Array = NDArray[np.float64]
+
+WITHIN = 1e-3
+"""Depth [m] from which on a joint is within something; a base stands on its table."""
 
 
 def singular_start(problem: Problem) -> tuple[str, ...]:
@@ -23,6 +28,25 @@ def singular_start(problem: Problem) -> tuple[str, ...]:
         f"the arm starts where its end effector cannot {ways}: the law neither holds nor moves it that way until "
         "something else has bent the arm",
     )
+
+
+def swallowed_joints(problem: Problem) -> tuple[str, ...]:
+    """Return a line for each surface that joints are within at the start: only the hand is touched by it."""
+    joints = world_frames(problem.law.robot.arm.chain, problem.q[None]).position[0, 1:-1]
+    told = []
+    for element in problem.elements:
+        if not isinstance(element, Surface):
+            continue
+        within = np.flatnonzero(element.depths(joints) > WITHIN) + 1
+        if within.size:
+            which = (
+                f"joint {within[0]} is" if within.size == 1 else f"joints {', '.join(map(str, within))} are"
+            )
+            told.append(
+                f"{which} within {element.label} at the start: the hand alone touches what is around it, and nothing "
+                "keeps the arm out; try a place or a size that leaves the arm free"
+            )
+    return tuple(told)
 
 
 def _words(way: Array) -> str:

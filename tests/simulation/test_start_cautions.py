@@ -1,0 +1,44 @@
+"""Joints that start within what only the hand touches."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from passiflex.robots.frames import world_frames
+from passiflex.simulation import resolve
+from passiflex.simulation.start_cautions import swallowed_joints
+from worlds import world
+
+
+def told(*environment: dict[str, Any]) -> tuple[str, ...]:
+    return swallowed_joints(resolve(world(environment=list(environment))))
+
+
+def joints() -> np.ndarray:
+    problem = resolve(world())
+    return world_frames(problem.law.robot.arm.chain, problem.q[None]).position[0, 1:-1]
+
+
+def test_a_sphere_about_a_joint_swallows_it() -> None:
+    base, elbow = joints()
+    one = {"kind": "sphere", "name": "ball", "centre": elbow.tolist(), "radius": 0.05, "stiffness": 1e4}
+    assert [line[:40] for line in told(one)] == ["joint 2 is within ball at the start: the"]
+    both = {"kind": "sphere", "name": "ball", "centre": ((base + elbow) / 2).tolist(), "stiffness": 1e4}
+    reach = float(np.linalg.norm(elbow - base)) / 2
+    assert told(both | {"radius": reach + 2e-3})[0].startswith("joints 1, 2 are within ball")
+    assert told(both | {"radius": reach - 2e-3}) == ()
+
+
+@pytest.mark.parametrize(("height", "swallows"), [(0.0, False), (-0.01, False), (0.01, True)])
+def test_a_base_stands_on_its_table(height: float, swallows: bool) -> None:
+    base = joints()[0]
+    table = {
+        "kind": "plane",
+        "point": (base + np.array([0, 0, height])).tolist(),
+        "normal": [0, 0, 1],
+        "stiffness": 1e4,
+    }
+    assert bool(told(table)) == swallows
