@@ -129,6 +129,8 @@ def _decided(found: tuple[Model, ...], value: Any) -> tuple[Model, ...]:
     """Return the branch of a union that the scenario takes; all of them where it leaves the section out."""
     if len(found) < 2 or not isinstance(value, dict):
         return found
+    if not any(map(tag_field, found)):  # then it is decided by what is in it
+        return tuple(m for m in found if value.keys() <= fields(m).keys())
     return tuple(m for m in found if value.get(name := tag_field(m) or "") in _words(fields(m)[name]))
 
 
