@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 from types import SimpleNamespace
 from typing import Any
@@ -14,36 +15,41 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from loops import SEEDS
-from passiflex.control import Measurement
 from passiflex.layout import Field, Layout
+from passiflex.sampled.declared_errors import error_layout
 from passiflex.sampled.measurement_bound import (
     BEND,
     SIGMAS,
     booked_bound,
     bound_state,
-    error_layout,
     sure,
     sure_state,
 )
+from passiflex.sampled.readings import EXACT, Paired, Readings
 from passiflex.sampled.sensors import UNFILTERED
 
 N, T = 2, 1e-3
 NONE = {f.name: np.zeros(f.shape) for f in error_layout(N)} | {"torque_bandwidth": UNFILTERED, "period": T}
 LAST = Layout((Field("last_q", (N,), "rad"), Field("last_tau_a", (N,), "N m"), Field("running", (), "1")))
-STATE = LAST + bound_state(N) + sure_state(N)
+
+
+def state_of(readings: Readings) -> Layout:
+    return LAST + bound_state(N, replace(readings, link=0, torque=0, paired=0)) + sure_state(N, readings)
 
 
 @lru_cache
-def booking(length: int) -> cs.Function:
-    """Return (state, q, τ_a, elapsed, whether the level is sure, errors) → (state, E, lowered), in a row."""
-    state, s = STATE.symbols("state")
+def booking(length: int, readings: Readings) -> cs.Function:
+    """Return (state, q, τ_a, elapsed, whether the level is sure, errors) → (state, E, lowered), in a row.
+
+    What is late is paired already.
+    """
+    state, s = state_of(readings).symbols("state")
     vector, e = error_layout(N).symbols("e")
     q, tau, elapsed, is_sure = cs.SX.sym("q", N), cs.SX.sym("tau", N), cs.SX.sym("dt"), cs.SX.sym("sure")
-    unread = [cs.SX.zeros(N)] * 3
-    y = Measurement(q, *unread, tau, cs.SX.zeros(6), cs.SX.zeros(N))
-    bound = booked_bound(y, elapsed, s.running < 1, s, e)
+    y = Paired(q, tau, elapsed, {"storage_jitter": cs.SX(0)} if readings.noisy else {})
+    bound = booked_bound(y, elapsed, s.running < 1, s, e, readings)
     after = {"last_q": q, "last_tau_a": tau, "running": 1} | bound.state | sure(is_sure, q, s, bound.state)
-    outputs = [STATE.stack(after), bound.total, bound.lowered]
+    outputs = [state_of(readings).stack(after), bound.total, bound.lowered]
     return cs.Function("book", [state, q, tau, elapsed, is_sure, vector], outputs).mapaccum(length)
 
 
@@ -52,6 +58,7 @@ def booked(
     tau: np.ndarray,
     elapsed: np.ndarray | float = T,
     is_sure: np.ndarray | float = 1.0,
+    readings: Readings = EXACT,
     **errors: Any,
 ) -> SimpleNamespace:
     """Return the fields of the state after each reading (length, N), with E and `lowered`."""
@@ -59,8 +66,9 @@ def booked(
     values = NONE | {name: np.broadcast_to(v, np.shape(NONE[name])) for name, v in errors.items()}
     numbers = np.tile(error_layout(N).pack(values)[:, None], n)
     rows = [np.broadcast_to(x, n)[None] for x in (elapsed, is_sure)]
-    states, total, lowered = booking(n)(np.zeros(STATE.size), q.T, tau.T, *rows, numbers)
-    fields = STATE.unpack(np.array(states).T)
+    layout = state_of(readings)
+    states, total, lowered = booking(n, readings)(np.zeros(layout.size), q.T, tau.T, *rows, numbers)
+    fields = layout.unpack(np.array(states).T)
     return SimpleNamespace(**fields, total=np.array(total).ravel(), lowered=np.array(lowered).ravel())
 
 

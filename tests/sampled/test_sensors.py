@@ -14,7 +14,7 @@ from scipy.signal import lfilter
 
 from loops import SEEDS
 from passiflex.control import Measurement
-from passiflex.sampled.sensors import UNFILTERED, Sensors, difference, low_pass, quantised
+from passiflex.sampled.sensors import UNFILTERED, Noise, Sensors, difference, low_pass, quantised
 
 N, PERIOD = 2, 1e-3
 SENSORS = Sensors(N)
@@ -30,6 +30,7 @@ OFF = {
     "velocity_bandwidth": UNFILTERED,
     "torque_bandwidth": UNFILTERED,
     "wrench_bandwidth": UNFILTERED,
+    **dict.fromkeys(["link_late", "motor_late", "torque_late", "wrench_late"], 0.0),
 }
 EPSILON = np.finfo(float).eps
 
@@ -63,7 +64,7 @@ def sensors(length: int) -> cs.Function:
     state, s = SENSORS.state.symbols("state")
     vector, g = SENSORS.layout.symbols("g")
     parts = Measurement(*cs.vertsplit(truth, np.cumsum([0, *SIZES]).tolist()))
-    reading = SENSORS.read(parts, noise, elapsed, s, g)
+    reading = SENSORS.read(parts, Noise(noise), elapsed, s, g)
     outputs = [reading.state, cs.densify(cs.vertcat(*reading.measured))]
     return cs.Function("read", [state, truth, noise, elapsed, vector], outputs).mapaccum(length)
 

@@ -15,17 +15,19 @@ from passiflex.layout import Field, Layout
 from passiflex.parts import Parts
 from passiflex.robots.arm import EndEffectorPose
 from passiflex.sampled.actions import action_layout, posture_spring, tracking_wrench
+from passiflex.sampled.declared_errors import error_layout
 from passiflex.sampled.external import AbstractExternalTorque, Known, TrueTorque
 from passiflex.sampled.governor import govern_pose, govern_stiffness
 from passiflex.sampled.inner_loop import AbstractInnerLoop, PlainInnerLoop
 from passiflex.sampled.measurement_bound import (
     booked_bound,
     bound_state,
-    error_layout,
+    jitter,
     sure_state,
 )
 from passiflex.sampled.period import Force, Granted, Read, Settled
 from passiflex.sampled.period_state import period_after, period_start, period_state
+from passiflex.sampled.readings import EXACT, Readings
 from passiflex.sampled.rest import Remembered, Rest
 from passiflex.sampled.signals import ControlParameters, LedgerEntry, ObserverNumbers, PeriodResult, Setpoint
 from passiflex.sampled.tank import AbstractTank, PeriodFlows, added, finite, unchanged
@@ -51,6 +53,8 @@ class SampledController:
     inner: AbstractInnerLoop = field(default_factory=PlainInnerLoop)
     actions: bool = True
     """Whether anything acts that the valve gates: without, a third of the arithmetic is left out."""
+    readings: Readings = EXACT
+    """Which of them are late or noisy: the books pair them."""
 
     @cached_property
     def parameters(self) -> Parts:
@@ -74,13 +78,13 @@ class SampledController:
     def state(self) -> Layout:
         """Return what is remembered from one period to the next; energies are sums since the start."""
         n, k = self.law.robot.n, self.law.task.size
-        books = period_state(n, k) + bound_state(n) + sure_state(n)
+        books = period_state(n, k) + bound_state(n, self.readings) + sure_state(n, self.readings)
         return books + self.external.state(n) + self.inner.state(n)
 
     def start(self, at: Rest) -> Remembered:
         """Return what is remembered at rest, of each field of the state."""
         n, k = self.law.robot.n, self.law.task.size
-        bounds = (bound_state(n) + sure_state(n)).zeros()
+        bounds = (bound_state(n, self.readings) + sure_state(n, self.readings)).zeros()
         return period_start(n, k, at) | bounds | self.external.start(at) | self.inner.start(at)
 
     def step(
@@ -105,7 +109,10 @@ class SampledController:
         variable = self._potential(force.now, granted.pose, granted.stiffness - p.gains.stiffness)
         asked, floor = setpoint.pose.position, p.tank.tank_floor
         values = period_after(read, force, granted, asked, command, variable, floor, s)
-        own = Layout(self.state.fields[: len(values)])
+        own = period_state(self.law.robot.n, self.law.task.size) + bound_state(
+            self.law.robot.n, self.readings
+        )
+        own += sure_state(self.law.robot.n, self.readings)
         after = cs.vertcat(own.stack(values), read.observed, read.seen)
         faulty = self.state.stack(vars(s) | {"faults": s.faults + 1, "lost_time": read.elapsed})
         safe = command._replace(tau_m=cs.if_else(ok, command.tau_m, s.last_command))
@@ -137,15 +144,18 @@ class SampledController:
         y, observed = self.external.estimate(y, elapsed, known, s)
         y, seen = self.inner.see(y, applied, elapsed, s, p.model, p.inner)
         first = s.running < 1
-        return Read(y, elapsed, first, observed, seen, booked_bound(y, elapsed, first, s, p.errors))
+        paired = self.readings.pair(y, elapsed, first, s, p.errors)
+        bound = booked_bound(paired, elapsed, first, s, p.errors, self.readings)
+        return Read(y, elapsed, first, observed, seen, paired, bound)
 
     def _settle(self, r: Read, s: Any, p: ControlParameters) -> Settled:
         """Return the books after what the period before took or gave."""
         held = EndEffectorPose(s.governed_position, s.governed_rotation)
         before = self.law.stored(r.y, p.model, _chosen(s.latched, p.fallback, p.gains))
-        storage = before.energy + self._potential(before, held, s.held_stiffness)
+        spring = self._potential(before, held, s.held_stiffness)
+        storage = before.energy + spring
         variable = self._potential(before, held, s.held_stiffness - p.gains.stiffness)
-        work = cs.if_else(r.first, 0, cs.dot(s.last_tau_a + r.y.tau_a, r.y.q - s.last_q) / 2)
+        work = cs.if_else(r.first, 0, cs.dot(s.last_tau_a + r.paired.tau_a, r.paired.q - s.last_q) / 2)
         flows = PeriodFlows(
             elapsed=r.elapsed,
             port_energy=work,
@@ -155,7 +165,14 @@ class SampledController:
             variable_spring_work=cs.if_else(r.first, 0, variable - s.variable_potential),
         )
         settled = self.tank.settle(s.tank_energy, flows, p.tank) if self.tank else unchanged(s.tank_energy)
-        return Settled(settled, work, storage, held)
+        shakes = cs.SX(0)
+        if self.readings.noisy:
+            quadratic = before.motor_kinetic + before.joint_spring + spring
+            carries = (
+                not before.gravity_storage.is_zero()
+            )  # whose slope at rest is that of the joints' springs
+            shakes = (1 + carries) * jitter(quadratic, p.errors)
+        return Settled(settled, work, storage, held, shakes)
 
     def _in_force(self, r: Read, settled: Settled, s: Any, p: ControlParameters) -> Force:
         """Return what is in force: the fallback from the period on in which the tank is overdrawn, T + S kept.
@@ -164,7 +181,10 @@ class SampledController:
         """
         tank, bound = settled.tank, r.bound
         falls = self.tank is not None and self.tank.falls_back
-        short = tank.level + bound.lowered < p.tank.tank_trip + s.sure_measurement_bound
+        lowered = bound.lowered
+        if self.readings.noisy:
+            lowered += p.errors.jitter_mean + settled.jitter + s.sure_storage_jitter
+        short = tank.level + lowered < p.tank.tank_trip + s.sure_measurement_bound
         overdrawn = cs.logic_and(short, s.latched < 1) if falls else cs.SX(0)
         latched = cs.fmax(s.latched, overdrawn)
         gains = _chosen(latched, p.fallback, p.gains)
@@ -182,7 +202,8 @@ class SampledController:
             tank=tank._replace(level=tank.level + rebased),
             lowest=tank.level,
             work=settled.work,
-            doubt=bound.total if self.tank is not None and self.tank.measures else cs.SX(0),
+            doubt=bound.total + settled.jitter if self.tank is not None and self.tank.measures else cs.SX(0),
+            jitter=settled.jitter,
         )
 
     def _command(

@@ -10,27 +10,30 @@ from passiflex.control.law import Gains, Stored
 from passiflex.control.signals import Measurement
 from passiflex.robots.arm import EndEffectorPose
 from passiflex.sampled.measurement_bound import Bound
+from passiflex.sampled.readings import Paired
 from passiflex.sampled.tank import TankEntry
 
 
 class Read(NamedTuple):
-    """The measurement as the law believes it, the time since the last one, what is remembered of it, and its doubt."""
+    """The measurement as the law believes it and as the books pair it, the time since the last, memory, and doubt."""
 
     y: Measurement
     elapsed: cs.SX
     first: cs.SX
     observed: cs.SX
     seen: cs.SX
+    paired: Paired
     bound: Bound
 
 
 class Settled(NamedTuple):
-    """The tank after the period before, w of that period, S at the reference then, which is `held`."""
+    """The tank after the period before, w of that period, S at the reference then, which is `held`; and its jitter."""
 
     tank: TankEntry
     work: cs.SX
     storage: cs.SX
     held: EndEffectorPose
+    jitter: cs.SX
 
 
 class Force(NamedTuple):
@@ -47,6 +50,7 @@ class Force(NamedTuple):
     lowest: cs.SX
     work: cs.SX
     doubt: cs.SX
+    jitter: cs.SX
 
 
 class Granted(NamedTuple):

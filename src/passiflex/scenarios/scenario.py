@@ -14,7 +14,6 @@ from passiflex.scenarios.control_settings import (
     Feedforward,
     GainChange,
     MotorSettings,
-    SensorSettings,
     change_mistakes,
     gain_mistakes,
 )
@@ -26,6 +25,7 @@ from passiflex.scenarios.model_errors import Deviations, ModelErrors
 from passiflex.scenarios.noise_settings import Noise
 from passiflex.scenarios.posture import StartPosture
 from passiflex.scenarios.row_interval import fitting_interval, interval_mistake
+from passiflex.scenarios.sensor_settings import SensorSettings
 from passiflex.scenarios.setpoints import Table, as_events
 from passiflex.scenarios.spans import Seconds
 from passiflex.scenarios.tank_settings import TankSettings
@@ -91,7 +91,7 @@ class Scenario(Section):
     )
     noise: Noise | None = Field(
         default=None,
-        description="noise on the measured joint torque, which the rigid law does not use; none if left out",
+        description="noise of the sensors; the rigid law does not use the joint torque; none if left out",
     )
     sensors: SensorSettings | None = Field(default=None, description="sensors, with control only")
     motors: MotorSettings | None = Field(default=None, description="motors; limits with control only")
@@ -225,9 +225,18 @@ class Scenario(Section):
     @classmethod
     def _whole_periods(cls, noise: Noise | None, info: ValidationInfo) -> Noise | None:
         control = info.data.get("control")
-        if noise is not None and control is not None:
-            return noise.fitted(control.rate)
-        return noise
+        if noise is None:
+            return None
+        if info.data.get("control", "in error") is None:
+            noise.require_torque_only()
+        return noise.fitted(control.rate) if control is not None else noise
+
+    @field_validator("sensors")
+    @classmethod
+    def _not_too_late(cls, sensors: SensorSettings | None, info: ValidationInfo) -> SensorSettings | None:
+        if sensors is not None and (control := info.data.get("control")) is not None:
+            sensors.require_soon(control.rate)
+        return sensors
 
     @field_validator("forces", mode="before")
     @classmethod

@@ -15,6 +15,7 @@ from passiflex.stability.judgement import Judgement
 from passiflex.stability.linear_loop import LinearLoop
 from passiflex.stability.modes import Modes, self_motions
 from passiflex.stability.remedies import TOOL, Remedy, remedies
+from passiflex.stability.sooner_sensors import deciding
 from passiflex.stability.trial import Change, Trial
 
 SLOW = 0.5
@@ -92,6 +93,8 @@ def _reasons(t: Trial) -> Iterator[str]:
         yield "periods that are missed let a torque act for longer than this loop bears"
     if s.jitter and late > s.delay and t.stable(late=s.delay):
         yield "commands that the jitter makes later than the law knows"
+    for entry, late in deciding(s):
+        yield f"sensors that are late, by a {entry} of {1e3 * late:.3g} ms"
     if _is_self_motion(t):
         stiff = t.loop.parts.unpack("actions", t.loop.problem.numbers)["posture_stiffness"]
         yield (

@@ -118,6 +118,7 @@ class LinearLoop:
         timing = self._timing(period, delay)
         flow, ran = self.flow(timing), self.runs(timing, gains, noise=True)
         size = flow.shape[0]
+        ran = ran[:, : size + self.n]
         sent = ran[self._told : self._told + self.n]
         return DrivenLoop(flow @ ran[:, :size], flow @ ran[:, size:], sent[:, :size], sent[:, size:])
 
@@ -192,7 +193,7 @@ class LinearLoop:
 
     def _heard(self, torque: Array, period: float, elapsed: float, gains: Gains) -> Array:
         by_torque = (self._kin or self).law.by(period, elapsed, gains)[:, self._told :]
-        return np.asarray(by_torque @ torque)
+        return np.asarray(by_torque[:, : self.n] @ torque)
 
     @cached_property
     def _torque(self) -> Array:

@@ -14,8 +14,10 @@ from passiflex.problems.altered import altered, rewritten, with_flange
 from passiflex.problems.problem import Problem, require_sampled
 from passiflex.problems.resolution import resolve
 from passiflex.scenarios.scenario_file import parse_scenario
+from passiflex.scenarios.sensor_settings import DELAYS
 from passiflex.stability.clock_words import hertz
 from passiflex.stability.judgement import Judgement, holds, judged_fallback
+from passiflex.stability.sooner_sensors import SHARES, sooner_sensors
 from passiflex.stability.trial import Change, Trial
 
 Array = NDArray[np.float64]
@@ -27,8 +29,6 @@ STRONGER = np.geomspace(1.25, 100, 12)
 DAMPINGS = (2.0, 5.0, 10.0, 20.0, 50.0, 0.0)
 """k_ns [1/s] that are tried."""
 FASTER = np.geomspace(1.25, 200, 16)
-SHARES = (0.75, 0.5, 0.25, 0.1, 0.0)
-"""Of a delay or of the periods that are missed."""
 TOOL = 0.02
 """Inertia of a tool [kg m^2] that a bare flange may lack."""
 INSIDE = 1.2
@@ -51,6 +51,7 @@ class Remedy(NamedTuple):
 def remedies(problem: Problem, found: Judgement) -> Iterator[Remedy]:
     """Yield what makes an unstable problem hold, the change of a number first; all were tried as a whole scenario."""
     trial = Trial(problem, found)
+    yield from (Remedy(*sooner) for sooner in sooner_sensors(trial.loop.problem))
     for look in LOST if found.missed else FAST:
         for remedy in look(trial):
             if _is_new(problem, remedy) and _tried(problem, remedy):
@@ -202,8 +203,11 @@ def _rate(t: Trial) -> Iterator[Remedy]:
     rate = math.ceil(INSIDE * factor / s.period / rows - 1e-9) * rows
     late, jitter = s.delay / s.period / rate, s.jitter / s.period / rate
     what = " and ".join(name for name, value in (("delay", late), ("jitter", jitter)) if value)
-    words = f"a rate of {hertz(rate)}" + (f", with as many periods of {what}" if what else "")
-    yield Remedy(words, {"control": {"rate": rate, "delay": late, "jitter": jitter}})
+    words = f"a rate of {hertz(rate)}" + f", with as many periods of {what}" * bool(what)
+    sensors = {name: v / s.period / rate for name, v in zip(DELAYS, s.lateness, strict=True) if v}
+    words += ", and the delays of the sensors" * bool(sensors)
+    entry = {"control": {"rate": rate, "delay": late, "jitter": jitter}, "sensors": sensors}
+    yield Remedy(words, {section: told for section, told in entry.items() if told})
 
 
 def _delay(t: Trial) -> Iterator[Remedy]:
