@@ -75,14 +75,15 @@ def late(rng: np.random.Generator) -> dict[str, Any]:
 def last_seen(run: Run, periods: float) -> np.ndarray:
     """Return ∫ τ_aᵀ q̇ at the instant that was read last, so many periods of the law late.
 
-    Every period has its row; in one that the law missed, what was read last stands. Between two readings it is some
-    instant between: the one with the largest value.
+    Every period has its row; in one that the law missed, what was read last stands. A reading between two samples is
+    taken to have passed as much of the energy between them.
     """
     rows = np.flatnonzero(np.abs(run.time - run["read_time"]) < AT_ONCE)
     count = np.searchsorted(rows, np.arange(len(run.time)), side="right") - 1
-    older, newer = (rows[np.maximum(count - int(f(periods)), 0)] for f in (np.ceil, np.floor))
-    W = run["joint_energy"]
-    return np.array([W[i : j + 1].max() for i, j in zip(older, newer, strict=True)])
+    older, newer = (
+        run["joint_energy"][rows[np.maximum(count - int(f(periods)), 0)]] for f in (np.ceil, np.floor)
+    )
+    return np.asarray(newer + (periods - np.floor(periods)) * (older - newer))
 
 
 def attacked(data: dict[str, Any]) -> Attacked:

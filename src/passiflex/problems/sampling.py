@@ -211,6 +211,7 @@ def _errors(
         "bend": BEND,
         "period": 1 / control.rate,
         "link_deviation": noise.link_deviation if noise else 0.0,
+        "noise_debit": 0.0,
         "jitter_mean": 0.0,  # of the loop as well: see `storage_jitter`
         "jitter_share": 0.0,
     }

@@ -22,6 +22,7 @@ class ErrorNumbers(Protocol):
     bend: cs.SX
     period: cs.SX
     link_deviation: cs.SX
+    noise_debit: cs.SX
     jitter_mean: cs.SX
     jitter_share: cs.SX
     late: cs.SX
@@ -42,6 +43,7 @@ def error_layout(n: int) -> Layout:
             Field("bend", (), "1", "`BEND`; 0 trusts the trapezoid"),
             Field("period", (), "s", "time between two readings without a gap"),
             Field("link_deviation", (), "rad", "standard deviation of the noise on q"),
+            Field("noise_debit", (), "W", "mean power that the noise on q takes from the tank's level"),
             Field("jitter_mean", (), "J", "what noise on q and θ adds to S at rest, at most"),
             Field("jitter_share", (), "J", "largest eigenvalue of its covariance in the metric of S"),
             Field("late", (), "1", "periods until q and τ_a of an instant have been read"),

@@ -68,12 +68,13 @@ class Bound(NamedTuple):
 
 def bound_state(n: int, readings: Readings = EXACT) -> Layout:
     """Return what is remembered from one period to the next."""
-    jitter = Field(
-        "storage_jitter", (), "J", "by how much noise on q and θ may have S read too low", kept=False
+    noisy = (
+        Field("storage_jitter", (), "J", "by how much noise on q and θ may have S read too low", kept=False),
+        Field("debited_energy", (), "J", "by how much noise on q lowers the level on average", kept=False),
     )
     return readings.book_state(n) + Layout(
         (
-            *[jitter] * readings.noisy,
+            *noisy[: 2 * readings.noisy],
             Field("measurement_bound", (), "J", "E, most that Σ w may be short of the energy given so far"),
             Field("read_time", (), "s", "when the sensors were last read"),
             Field("charged_energy", (), "J", "its part for the mean credit of noise that lasts"),
@@ -107,7 +108,7 @@ def sure_state(n: int, readings: Readings = EXACT) -> Layout:
     """Return what is remembered of the last period in which the level was sure: above the floor, with E subtracted."""
     known = {f.name: f for f in bound_state(n, readings)}
     names = ["measurement_bound", "walk", "withheld_energy", "joint_work", "torque"]
-    names += ["storage_jitter"] * readings.noisy
+    names += ["storage_jitter", "debited_energy"] * readings.noisy
     fields = [known[name]._replace(name=f"sure_{name}", kept=True) for name in names]
     return Layout((*fields, Field("sure_q", (n,), "rad", "q")))
 
@@ -151,6 +152,8 @@ def booked_bound(
         "torque": torque,
         **y.state,
     }
+    if readings.noisy:
+        state["debited_energy"] = s.debited_energy + cs.if_else(first, 0, e.noise_debit * elapsed)
     r = SimpleNamespace(**state)
     least = 1 - cs.mmax(e.torque_scale)  # a torque may be read this share of its size
     constant = _constant(y.q - start, r.joint_work, r.first_torque + torque, e)
@@ -168,6 +171,8 @@ def booked_bound(
     constant = _constant(y.q - s.sure_q, r.joint_work - s.sure_joint_work, s.sure_torque + torque, e)
     walked = SIGMAS * _root(cs.fmax(r.walk - s.sure_walk, 0) + 2 * begun + sure_ends)
     lowered = (constant + walked + cs.fmax(s.sure_withheld_energy - r.withheld_energy, 0)) / least
+    if readings.noisy:
+        lowered += r.debited_energy - s.sure_debited_energy
     return Bound(total, lowered, {"measurement_bound": total} | state)
 
 

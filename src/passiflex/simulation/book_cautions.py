@@ -58,7 +58,7 @@ def _jitter(problem: SampledProblem) -> tuple[str, ...]:
     return (
         f"noise on the positions shakes the storage that the tank reads, by up to {shakes:.2g} J where {floor:g} J are "
         f"stored: an active loop is seen that much later, and the floor holds {floor:g} J back; "
-        f"{_calmer(problem, shakes)}",
+        f"{_calmer(problem)}",
     )
 
 
@@ -78,15 +78,15 @@ def _shaken(problem: SampledProblem) -> float:
     return POSTURES * at_rest.mean + 2 * SIGMAS * math.sqrt(2 * POSTURES * at_rest.share * problem.tank.floor)
 
 
-def _calmer(problem: SampledProblem, shakes: float) -> str:
-    """Return a low-pass of the velocities that at least halves the jitter, found by trying; or what else there is."""
+def _calmer(problem: SampledProblem) -> str:
+    """Return a low-pass of the velocities with which the floor is enough, found by trying; or what else there is."""
     now = problem.parts.unpack("sensors", problem.numbers)
     for frequency in FILTERS if now["velocity_differences"] and not problem.controller.inner.predicts else ():
         pole = 2 * math.pi * frequency
         changed = problem.with_numbers({"velocity_bandwidth": pole}, "sensors")
         if pole < now["velocity_bandwidth"] and LinearLoop(changed).radius() < 1:
             left = _shaken(changed)
-            if left <= shakes / 2:
+            if left <= TREMBLING * problem.tank.floor:
                 return f"try sensors.velocity_filter: {frequency:g} Hz, with {left:.2g} J"
     return "try less noise, or a higher floor (tank.floor)"
 

@@ -56,18 +56,23 @@ def shaken(loop: LinearLoop, gains: Mapping[str, ArrayLike]) -> NDArray[np.float
 
 
 def noise_credit(problem: SampledProblem) -> float:
-    """Return the mean power [W] that the noise of a sampled problem credits its tank with, ≥ 0.
+    """Return the mean power [W] that the noise of a sampled problem credits its tank with, ≥ 0, at most."""
+    return max(0.0, *noise_powers(problem), 0.0)
 
-    That of its gains, of those that it changes to, and of its fallback, the largest, at the start. Gains that
-    are not stable have none. White noise of τ_a, new in each period, is followed by no motion that it still could meet.
+
+def noise_powers(problem: SampledProblem) -> list[float]:
+    """Return the mean powers [W] that the noise of a sampled problem credits its tank with, or debits it if negative.
+
+    Those of its gains, of those that it changes to, and of its fallback, at the start. Gains that are not stable have
+    none. White noise of τ_a, new in each period, is followed by no motion that it still could meet.
     """
     noise = problem.noise
     if noise is None:
-        return 0.0
+        return []
     lasting, soon = round(noise.hold / problem.period), problem.lateness.link + problem.delay < problem.period
     lasts, shakes = bool(noise.variance) and lasting > 1, bool(noise.link_deviation) and soon
     if not (lasts or shakes):
-        return 0.0
+        return []
     loop = LinearLoop(problem)
     later: list[Mapping[str, ArrayLike]] = [
         {"stiffness": c.stiffness, "damping": c.damping} for c in extremes(problem.told_gains, FEW)
@@ -78,15 +83,16 @@ def noise_credit(problem: SampledProblem) -> float:
             energy = mean_credit(loop.driven(gains=gains), loop.n, noise.variance, lasting) if lasts else 0.0
             energy += noise.link_deviation**2 / 2 * float(np.trace(shaken(loop, gains))) if shakes else 0.0
             powers.append(energy / problem.period)
-    return max(0.0, *powers) if powers else 0.0
+    return powers
 
 
 def charged(problem: SampledProblem) -> SampledProblem:
     """Return the sampled problem with what its noise does, `POSTURES` times, declared to its controller."""
-    credit, noise = noise_credit(problem), problem.noise
-    found = {"noise_credit": POSTURES * credit} if credit else {}
+    powers, noise = noise_powers(problem), problem.noise
+    credit = max(0.0, *powers, 0.0)
+    found = {"noise_credit": credit} if credit else {}
     if noise is not None and noise.moves and problem.controller.tank is not None:
-        found |= {
-            f"jitter_{name}": POSTURES * value for name, value in storage_jitter(problem)._asdict().items()
-        }
-    return problem.with_numbers(found, "errors") if found else problem
+        found |= {"noise_debit": max(0.0, *(-power for power in powers), 0.0)}
+        found |= {f"jitter_{name}": value for name, value in storage_jitter(problem)._asdict().items()}
+    declared = {name: POSTURES * value for name, value in found.items()}
+    return problem.with_numbers(declared, "errors") if declared else problem
