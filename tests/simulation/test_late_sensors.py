@@ -175,3 +175,15 @@ def test_what_the_tank_cannot_know_yet_is_said_before_the_run() -> None:
         "covers that up to 25 W"
     )
     assert book_cautions(resolve(world(**late(0, 3, 0, 3)))) == ()
+
+
+@pytest.mark.slow
+def test_another_engine_reads_the_same() -> None:
+    """MuJoCo moves the arm, and the sensors, late and noisy, are the law's: both agree to round-off."""
+    pytest.importorskip("mujoco")
+    wrench = {"rows": "t,fx,fy,fz\n0,0,0,0\n0.2,3,0,2\n0.3,0,0,0\n"}
+    noise = {"link_deviation": 1e-5, "motor_deviation": 1e-5}
+    scenario = world(**late(2, 0.5, 1, noise=noise, forces=wrench))
+    own, other = simulate(scenario), simulate(scenario, engine="mujoco")
+    for name in ("q", "measured_q", "tank_energy", "measurement_bound"):
+        np.testing.assert_allclose(other[name], own[name], rtol=0, atol=1e-12)

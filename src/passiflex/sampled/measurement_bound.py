@@ -164,13 +164,14 @@ def booked_bound(
         ends, sure_ends = (
             e.link_deviation**2 * (cs.sumsqr(raw) + t**2) for t in (r.first_torque, s.sure_torque)
         )
-    if readings.late:
-        hidden += _meanwhile(dq, dtau, since, s, e)
+    passing = _meanwhile(dq, dtau, since, s, e) if readings.late else cs.SX(0)
+    hidden += passing
     random = SIGMAS * _root(r.walk + begun + r.bent + ends)
     total = (constant + random + hidden + cs.fmax(r.withheld_energy, 0)) / least
     constant = _constant(y.q - s.sure_q, r.joint_work - s.sure_joint_work, s.sure_torque + torque, e)
     walked = SIGMAS * _root(cs.fmax(r.walk - s.sure_walk, 0) + 2 * begun + sure_ends)
     lowered = (constant + walked + cs.fmax(s.sure_withheld_energy - r.withheld_energy, 0)) / least
+    lowered += passing  # where S was read before what it gave or took
     if readings.noisy:
         lowered += r.debited_energy - s.sure_debited_energy
     return Bound(total, lowered, {"measurement_bound": total} | state)
