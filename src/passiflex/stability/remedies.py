@@ -201,12 +201,12 @@ def _rate(t: Trial) -> Iterator[Remedy]:
     s = t.loop.problem
     rows = 1 / t.problem.output_interval  # of which the new rate is a multiple, so that the rows still fit
     rate = math.ceil(INSIDE * factor / s.period / rows - 1e-9) * rows
-    late, jitter = s.delay / s.period / rate, s.jitter / s.period / rate
-    kinds = {"delay": late, "jitter": jitter, "delay of the sensors": max(s.lateness)}
+    control = {"delay": s.delay / s.period / rate, "jitter": s.jitter / s.period / rate}
+    kinds = control | {"delay of the sensors": max(s.lateness)}
     what = " and ".join(name for name, value in kinds.items() if value)
     words = f"a rate of {hertz(rate)}" + f", with as many periods of {what}" * bool(what)
     sensors = {name: v / s.period / rate for name, v in zip(DELAYS, s.lateness, strict=True) if v}
-    yield Remedy(words, {"control": {"rate": rate, "delay": late, "jitter": jitter}, "sensors": sensors})
+    yield Remedy(words, {"control": {"rate": rate, **control}} | ({"sensors": sensors} if sensors else {}))
 
 
 def _delay(t: Trial) -> Iterator[Remedy]:

@@ -141,6 +141,11 @@ def tag_field(model: Model) -> str | None:
     return None
 
 
+def with_entries(found: Iterable[Model], written: dict[str, Any]) -> tuple[Model, ...]:
+    """Return the models that have all the entries that were written: where no entry chooses one, they do."""
+    return tuple(m for m in found if written.keys() <= fields(m).keys())
+
+
 def _tag(model: Model) -> str:
     name = tag_field(model)
     return str(typing.get_args(fields(model)[name].annotation)[0]) if name else ""
