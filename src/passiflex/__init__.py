@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from passiflex.simulation import salvage as salvage
     from passiflex.simulation import setpoint_table as setpoint_table
     from passiflex.simulation import simulate as simulate
+    from passiflex.simulation import wrench_table as wrench_table
     from passiflex.studies import shipped_scenario as shipped_scenario
 
 _ROOMS = {
@@ -65,6 +66,7 @@ _ROOMS = {
     "salvage": "simulation",
     "shipped_scenario": "studies",
     "setpoint_table": "simulation",
+    "wrench_table": "simulation",
     "show": "reports",
     "simulate": "simulation",
 }

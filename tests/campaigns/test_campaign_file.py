@@ -128,7 +128,7 @@ def test_a_section_that_the_scenario_leaves_out_is_made_if_it_is_then_valid():
     assert c.scenario.noise is None
     text = changed("noise.torque_variance", "noise.hold", INLINE)
     assert mistakes(changed("low: 0,", "low: 1 ms,", text)) == [
-        "line 16, column 15, parameters.'noise.hold': with every parameter at its median: noise.torque_variance: missing: variance per joint, (N m)^2"
+        "line 16, column 15, parameters.'noise.hold': with every parameter at its median: noise.torque_variance: missing: variance per joint, (N m)^2; or link_deviation, motor_deviation, of positions"
     ]
 
 
@@ -185,7 +185,7 @@ U01 = "{distribution: uniform, low: 0, high: 1}"
         (f"law.target_inertia.ratio: {U01}", "column 3, parameters.'law.target_inertia.ratio': unknown name 'target_inertia' in law; try 'shaped_inertia'"),
         (f"robot: {U01}", "column 3, parameters.robot: is not a number: name in the catalogue, or path of a robot file (.yaml)"),
         (f"seed: {U01}", "column 3, parameters.seed: every sample has its own seed, from that of the campaign; remove it"),
-        (f"noise: {U01}", "column 3, parameters.noise: is a mapping; add the name of a number in it: torque_variance, hold"),
+        (f"noise: {U01}", "column 3, parameters.noise: is a mapping; add the name of a number in it: torque_variance, link_deviation, motor_deviation, hold"),
         (f"forces: {U01}", "column 3, parameters.forces: is a list; add which entry, from 1, and the name of a number in it: forces.1.…"),
         (f"forces.1.force: {U01}", "column 3, parameters.'forces.1.force': is a list of numbers; add which one, from 1: forces.1.force.1"),
         (f"forces.2.force.1: {U01}", "column 3, parameters.'forces.2.force.1': forces has entries 1 to 1; got '2'"),

@@ -65,6 +65,16 @@ def told(**changes: Any) -> dict[str, str]:
             "sensors",
             "q to 0.1 mrad, θ exact, velocities: differences",
         ),
+        (
+            {"sensors": {"link_delay": "1 ms", "torque_delay": "2.5 ms"}},
+            "sensors",
+            "q exact, θ exact, velocities: true, q 1 ms late, τ_a 2.5 ms late",
+        ),
+        (
+            {"noise": {"link_deviation": 1e-5}},
+            "noise of q, θ",
+            "deviations 1e-05 and 0 rad, new in each period",
+        ),
         ({"motors": {"torque_limit": "robot"}}, "motors", "torques limited, no friction"),
         ({"motors": {"coulomb_friction": 1}}, "motors", "torques not limited, with friction"),
         (

@@ -210,11 +210,13 @@ def planar() -> FlexibleJointRobot:
 def planar_rig(*choices: Any, rigid: bool = False) -> Rig:
     """Return a rig of `planar2r` that holds positions, with the tank (the port's if not told) and so on."""
     law = (RigidImpedanceLaw if rigid else ImpedanceLaw)(planar(), PositionTask(), StaticGravity())
-    return Rig(SampledController(law, *(choices or (PortTank(),))))
+    return Rig(SampledController(law, *(choices or (PortTank(),)), compensates=True))
 
 
 @lru_cache
 def spatial_rig() -> Rig:
     """Return a rig of a random arm with three joints that holds poses."""
     robot = with_joints(_chain(3, 7, True), 7)
-    return Rig(SampledController(ImpedanceLaw(robot, PoseTask(), StaticGravity()), PortTank()))
+    return Rig(
+        SampledController(ImpedanceLaw(robot, PoseTask(), StaticGravity()), PortTank(), compensates=True)
+    )

@@ -14,7 +14,8 @@ from scipy.signal import lfilter
 
 from loops import SEEDS
 from passiflex.control import Measurement
-from passiflex.sampled.sensors import UNFILTERED, Sensors, difference, low_pass, quantised
+from passiflex.sampled.readings import Readings
+from passiflex.sampled.sensors import UNFILTERED, Noise, Sensors, difference, low_pass, quantised
 
 N, PERIOD = 2, 1e-3
 SENSORS = Sensors(N)
@@ -30,6 +31,7 @@ OFF = {
     "velocity_bandwidth": UNFILTERED,
     "torque_bandwidth": UNFILTERED,
     "wrench_bandwidth": UNFILTERED,
+    **dict.fromkeys(["link_late", "motor_late", "torque_late", "wrench_late"], 0.0),
 }
 EPSILON = np.finfo(float).eps
 
@@ -63,7 +65,7 @@ def sensors(length: int) -> cs.Function:
     state, s = SENSORS.state.symbols("state")
     vector, g = SENSORS.layout.symbols("g")
     parts = Measurement(*cs.vertsplit(truth, np.cumsum([0, *SIZES]).tolist()))
-    reading = SENSORS.read(parts, noise, elapsed, s, g)
+    reading = SENSORS.read(parts, Noise(noise), elapsed, s, g)
     outputs = [reading.state, cs.densify(cs.vertcat(*reading.measured))]
     return cs.Function("read", [state, truth, noise, elapsed, vector], outputs).mapaccum(length)
 
@@ -284,3 +286,61 @@ def _with_torque(truth: np.ndarray, tau_a: np.ndarray) -> np.ndarray:
     out = truth.copy()
     out[:, 4 * N : 5 * N] = tau_a
     return out
+
+
+@lru_cache
+def late_sensors(length: int, readings: Readings) -> cs.Function:
+    """Return (state, truth, noise of τ_a, q, θ, elapsed, parameters) → (state, reading), in a row."""
+    late = Sensors(N, readings=readings)
+    truth, elapsed = cs.SX.sym("truth", sum(SIZES)), cs.SX.sym("elapsed")
+    noise = [cs.SX.sym(name, N) for name in Noise._fields]
+    state, s = late.state.symbols("state")
+    vector, g = late.layout.symbols("g")
+    parts = Measurement(*cs.vertsplit(truth, np.cumsum([0, *SIZES]).tolist()))
+    reading = late.read(parts, Noise(*noise), elapsed, s, g)
+    outputs = [reading.state, cs.densify(cs.vertcat(*reading.measured))]
+    return cs.Function("late", [state, truth, *noise, elapsed, vector], outputs).mapaccum(length)
+
+
+def test_a_sensor_that_is_late_says_what_it_would_have_said_before() -> None:
+    """All that the readings go through is as without, each so many readings ago; velocities as late as positions."""
+    length, ago = 60, {"link": 2, "motor": 1, "torque": 3, "wrench": 4}
+    rng = np.random.default_rng(6)
+    truth, noise = rng.normal(size=(length, sum(SIZES))), rng.normal(size=(3, length, N))
+    effects = OFF | {"velocity_differences": 1.0, "velocity_bandwidth": 300.0, "torque_bandwidth": 200.0}
+    effects |= {"link_resolution": 0.1, "link_offset": [0.1, -0.2]}
+    lates = {f"{name}_late": float(k) for name, k in ago.items()}
+    found = []
+    for readings, numbers in (
+        (Readings(noisy=True), effects),
+        (Readings(noisy=True, **ago), effects | lates),
+    ):
+        vector = np.tile(SENSORS.layout.pack(numbers)[:, None], length)
+        size = Sensors(N, readings=readings).state.size
+        columns = [truth.T, *(part.T for part in noise), np.full((1, length), PERIOD), vector]
+        rows = np.array(late_sensors(length, readings)(np.zeros(size), *columns)[1]).T
+        found.append(Measurement(*np.split(rows, np.cumsum(SIZES)[:-1], axis=1)))
+    on_time, late = found
+    for name, of in zip(
+        Measurement._fields, ("link", "motor", "link", "motor", "torque", "wrench", ""), strict=True
+    ):
+        k = ago.get(of, 0)
+        one, other = getattr(on_time, name), getattr(late, name)
+        np.testing.assert_array_equal(other[k:], one[: length - k])
+        np.testing.assert_array_equal(other[:k], np.tile(one[0], (k, 1)))
+
+
+def test_noise_of_positions_is_added_before_the_encoder_rounds_and_velocities_have_it() -> None:
+    rng, length = np.random.default_rng(7), 20
+    truth, noise = np.zeros((length, sum(SIZES))), rng.normal(size=(3, length, N))
+    vector = np.tile(
+        SENSORS.layout.pack(OFF | {"velocity_differences": 1.0, "motor_resolution": 0.5})[:, None], length
+    )
+    columns = [truth.T, *(part.T for part in noise), np.full((1, length), PERIOD), vector]
+    exact = Readings(noisy=True)
+    rows = np.array(late_sensors(length, exact)(np.zeros(SENSORS.state.size), *columns)[1]).T
+    read = Measurement(*np.split(rows, np.cumsum(SIZES)[:-1], axis=1))
+    np.testing.assert_array_equal(read.q, noise[1])
+    np.testing.assert_array_equal(read.theta, 0.5 * np.floor(noise[2] / 0.5 + 0.5))
+    np.testing.assert_allclose(read.dq[1:], np.diff(noise[1], axis=0) / PERIOD, rtol=1e-12)
+    assert not read.dq[0].any()

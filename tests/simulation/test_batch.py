@@ -302,6 +302,9 @@ PAPER: dict[str, Any] = {
     "law": {"shaped_stiffness": {"ratio": 10}, "shaped_inertia": {"ratio": 0.01}},
     "control": {"external_torque": "measured", "delay": 1e-3, "allow_unstable": True},
     "tank": {"kind": "paper"},
+    "reference": [
+        {"at": 0, "kind": "step", "by": [0, 0, 0.05]}
+    ],  # at once: at rest, round-off would be what grows
 }
 CALM: dict[str, Any] = merged(
     PAPER, {"law": {"shaped_stiffness": {"ratio": 1}, "shaped_inertia": {"ratio": 0.4}}}

@@ -13,7 +13,7 @@ import yaml
 
 import passiflex as pf
 from passiflex.errors import ArgumentError, FrozenError, PassiflexError, ScenarioError
-from passiflex.scenarios.scenario import Force
+from passiflex.scenarios.forces import Force
 from passiflex.simulation import Scenario, parse_scenario
 from worlds import PLAIN, PLANAR, merged
 

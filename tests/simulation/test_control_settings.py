@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from passiflex.errors import PassiflexError, ScenarioError, SizeError
-from passiflex.scenarios.control_settings import Fallback, SensorSettings
+from passiflex.scenarios.control_settings import Fallback
+from passiflex.scenarios.sensor_settings import SensorSettings
 from passiflex.scenarios.tank_settings import TankSettings
 from passiflex.simulation import Scenario, parse_scenario, resolve
 from passiflex.studies import shipped_scenario

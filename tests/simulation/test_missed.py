@@ -116,3 +116,9 @@ def test_the_judge_refuses_what_misses_too_much_and_says_how_much_holds() -> Non
     ) as error:
         simulate(scenario)
     assert "% of the periods missed (now 85 %)" in str(error.value)
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+def test_an_iteration_that_leaves_the_numbers_certifies_nothing() -> None:
+    """A remedy that is tried may make the map huge: the answer is no, and no error of an eigenvalue routine."""
+    assert not _certified(np.full((2, 3, 3), 1e200), np.array([0.5, 0.5]))

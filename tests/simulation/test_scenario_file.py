@@ -217,7 +217,7 @@ SHAPED = "shaped_stiffness: {ratio: 10}"
         (
             "noise: {torque_variance: 0.2 (N m)^2, hold: 1 ms}",
             "noise: 3",
-            "line 19, column 8, noise: expected a mapping with torque_variance, hold; got 3",
+            "line 19, column 8, noise: expected a mapping with torque_variance, link_deviation, motor_deviation, hold; got 3",
         ),
         (
             "forces:\n  -",

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from passiflex.control.motion import Pose
 from passiflex.problems.timeline import timeline
-from passiflex.scenarios.scenario import Force
+from passiflex.scenarios.forces import Force
 from passiflex.simulation import Scenario, parse_scenario
 from work import calls
 from worlds import PLANAR

@@ -12,7 +12,15 @@ from pydantic.fields import FieldInfo
 
 from passiflex.robots.catalogue import read_description
 from passiflex.scenarios.scenario import Scenario
-from passiflex.texts.model_mistakes import Model, fields, former_names, models, suggested, tag_field
+from passiflex.texts.model_mistakes import (
+    Model,
+    fields,
+    former_names,
+    models,
+    suggested,
+    tag_field,
+    with_entries,
+)
 from passiflex.texts.quantity import Quantity
 
 _INDEX = re.compile(r"[1-9][0-9]{0,5}")
@@ -129,6 +137,8 @@ def _decided(found: tuple[Model, ...], value: Any) -> tuple[Model, ...]:
     """Return the branch of a union that the scenario takes; all of them where it leaves the section out."""
     if len(found) < 2 or not isinstance(value, dict):
         return found
+    if not any(map(tag_field, found)):
+        return with_entries(found, value)
     return tuple(m for m in found if value.get(name := tag_field(m) or "") in _words(fields(m)[name]))
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from passiflex.diagrams.panel import Array, Mark, Span
 from passiflex.runs.run import Run
 from passiflex.scenarios.environment import labelled
-from passiflex.scenarios.scenario import Force, Scenario
+from passiflex.scenarios.scenario import Scenario
 
 GOVERNED = ("reference", "stiffness")
 """What the governor may hold back; its share is the signal NAME_share."""
@@ -45,16 +45,13 @@ def _end(run: Run) -> float:
 
 def _forces(scenario: Scenario) -> list[Span]:
     """Return what acts on the end effector, is held or exerted by it, for some time."""
-    spans = [Span(f.start, f.end, _wrench(f), "force") for f in scenario.forces]
+    spans = []
+    for f in scenario.forces:
+        times = [t for acting in f.acting(scenario.duration) for t in acting[:2]]
+        spans.append(Span(times[0], times[-1], f.words(), "force"))
     spans += [Span(f.start, f.end, "feed-forward wrench", "force") for f in scenario.feedforward]
     there = ((*entry.lasts, label) for label, entry in labelled(scenario.environment).items())
     return spans + [Span(*entry, "force") for entry in there if math.isfinite(entry[1])]
-
-
-def _wrench(force: Force) -> str:
-    parts = [f"force {np.linalg.norm(force.force):.3g} N"] if any(force.force) else []
-    parts += [f"moment {np.linalg.norm(force.moment):.3g} N m"] if any(force.moment) else []
-    return ", ".join(parts) or "force 0 N"
 
 
 def _governed(run: Run, names: tuple[str, ...]) -> list[Span]:

@@ -115,7 +115,7 @@ def structure(loop: SampledLoop) -> tuple[object, ...]:
     of_tank = type(tank) if tank is None or type(tank) in TANKS.values() else tank
     return (
         _urdf(law.robot.arm), law.structure, of_tank, controller.external, controller.inner, controller.actions,
-        controller.held_task, _structures(loop.elements), loop.effects,
+        controller.compensates, controller.held_task, controller.readings, _structures(loop.elements), loop.effects,
     )  # fmt: skip
 
 

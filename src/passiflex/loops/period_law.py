@@ -21,7 +21,7 @@ from passiflex.robots.arm import EndEffectorPose
 from passiflex.sampled.controller import SampledController
 from passiflex.sampled.motors import limit_layout, limited
 from passiflex.sampled.rest import Rest
-from passiflex.sampled.sensors import AbstractSensorEffect, Sensors
+from passiflex.sampled.sensors import AbstractSensorEffect, Noise, Sensors
 from passiflex.sampled.signals import ControlParameters, PeriodResult, Setpoint
 
 
@@ -51,7 +51,7 @@ class PeriodLaw:
     @cached_property
     def sensors(self) -> Sensors:
         """Return the sensors."""
-        return Sensors(self.controller.law.robot.n, self.effects)
+        return Sensors(self.controller.law.robot.n, self.effects, self.controller.readings)
 
     @cached_property
     def parameters(self) -> Parts:
@@ -105,7 +105,10 @@ class PeriodLaw:
         """
         robot = self.controller.law.robot
         limits = views["limits"]
-        y, read = self.sensors.read(truth, told.torque_noise, told.elapsed, c, views["sensors"])
+        noise = Noise(told.torque_noise)
+        if self.controller.readings.noisy:
+            noise = Noise(told.torque_noise, told.link_noise, told.motor_noise)
+        y, read = self.sensors.read(truth, noise, told.elapsed, c, views["sensors"])
         setpoint = Setpoint(
             EndEffectorPose(told.desired_position, told.desired_rotation),
             told.desired_velocity,
@@ -155,8 +158,8 @@ class PeriodLaw:
         )
 
     def _compensated(self, result: PeriodResult) -> tuple[Signal, ...]:
-        """Return what is given against friction, where anything acts that the valve gates."""
-        if not self.controller.actions:
+        """Return what is given against friction, if anything is."""
+        if not self.controller.compensates:
             return ()
         power = cs.dot(result.compensation, result.believed.dtheta)
         return (Signal(Field("compensation_power", (), "W", "given against friction, as it is read"), power),)

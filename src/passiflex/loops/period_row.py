@@ -27,6 +27,8 @@ class PeriodRow:
     environment: Layout
     turned: bool = False
     """As `AbstractTask.turned`."""
+    noisy: bool = False
+    """Whether there is noise on q and θ."""
 
     @cached_property
     def layout(self) -> Layout:
@@ -47,8 +49,16 @@ class PeriodRow:
                 Field("desired_damping", (k, k), "N s/m, N s, N m s/rad", "D_x", kept=False),
                 Field("feedforward", (6,), "N, N m", "wrench that the end effector is to exert", kept=False),
                 Field("torque_noise", (n,), "N m", "of the joint torque sensors", kept=False),
+                *self._position_noise,
                 Field("elapsed", (), "s", "since the last period that ran", kept=False),
             )
+        )
+
+    @property
+    def _position_noise(self) -> tuple[Field, ...]:
+        named = {"link_noise": "of the readings of q", "motor_noise": "of the readings of θ"}
+        return tuple(
+            Field(name, (self.n,), "rad", said, kept=False) for name, said in named.items() if self.noisy
         )
 
     @cached_property
@@ -73,7 +83,8 @@ class PeriodRow:
     @cached_property
     def drawn(self) -> Layout:
         """Return what is new in every period."""
-        return Layout(tuple(f for f in self.layout if f.name in ("torque_noise", "elapsed")))
+        names = {"torque_noise", "elapsed", *(f.name for f in self._position_noise)}
+        return Layout(tuple(f for f in self.layout if f.name in names))
 
     @cached_property
     def function(self) -> cs.Function:
@@ -106,8 +117,7 @@ class PeriodRow:
             "desired_stiffness": told(c.old_stiffness, c.new_stiffness, 0),
             "desired_damping": told(c.old_damping, c.new_damping, 1),
             "feedforward": c.feedforward,
-            "torque_noise": chance.torque_noise,
-            "elapsed": chance.elapsed,
+            **vars(chance),
         }
         row = self.layout.stack(values)
         return cs.Function("row", [time, schedule, drawn], [cs.densify(row)], {"cse": True})

@@ -61,7 +61,7 @@ def require_distinct(parts: Sequence[Layout]) -> None:
 def axes_of_signals() -> dict[str, tuple[str, ...]]:
     """Return the axes of every signal that a run over time may have, after that of time."""
     law = ImpedanceLaw(FlexibleJointRobot.load("planar2r"))
-    everything = SampledController(law, PortTank(), MomentumObserver(), MatchedInnerLoop())
+    everything = SampledController(law, PortTank(), MomentumObserver(), MatchedInnerLoop(), compensates=True)
     continuous = instant_parts(ClosedLoop(law, ELEMENTS))
     layouts = [*sample_parts(SampledLoop(everything)).values(), *continuous]
     return {f.name: f.dims for layout in layouts for f in layout.kept}

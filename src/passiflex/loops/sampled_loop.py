@@ -88,7 +88,8 @@ class SampledLoop:
     def period(self) -> PeriodRow:
         """Return how the row of a period comes about."""
         law = self.controller.law
-        return PeriodRow(law.robot.n, law.task.size, self.plant.environment, law.task.turned)
+        noisy = self.controller.readings.noisy
+        return PeriodRow(law.robot.n, law.task.size, self.plant.environment, law.task.turned, noisy)
 
     @property
     def row(self) -> Layout:

@@ -31,8 +31,8 @@ def step_window(scenario: Scenario) -> StepWindow | None:
         return None
     times = [t for e in scenario.reference for t in _instants(e, scenario)]
     times += [t for c in scenario.gain_changes for t in (c.at, c.at + c.duration)]
-    for entries in (scenario.forces, scenario.feedforward):
-        times += [t for entry in entries for t in (entry.start, entry.end)]
+    times += [t for f in scenario.forces for acting in f.acting(scenario.duration) for t in acting[:2]]
+    times += [t for entry in scenario.feedforward for t in (entry.start, entry.end)]
     times += [t for entry in scenario.environment for t in entry.lasts]
     size = float(np.linalg.norm(step.by))
     end = min([t for t in times if t > step.at] + [scenario.duration])

@@ -15,9 +15,12 @@ from passiflex.control.motion import rebased
 from passiflex.control.posture import posture
 from passiflex.errors import NameUnknownError, ValueRangeError
 from passiflex.problems.problem import FROM_THE_START, Problem, SampledProblem, require_sampled
+from passiflex.problems.sampling import late_errors, late_sensors
+from passiflex.sampled.readings import Lateness, Readings
 from passiflex.scenarios.control_settings import MOST_PERIODS, MOST_PREDICTED
 from passiflex.scenarios.scenario import Scenario
 from passiflex.scenarios.scenario_file import parse_scenario
+from passiflex.scenarios.sensor_settings import DELAYS, MOST_LATE
 from passiflex.texts.yaml_tree import read_back
 
 Array = NDArray[np.float64]
@@ -77,13 +80,17 @@ def altered(
     if plant is not None:
         data["robot"] = f"{law.robot.name}, changed in memory"
     kept = data["control"].get("fallback", {})
+    lag, noisy = s.lateness.in_periods(period), s.controller.readings.noisy
+    require_soon(lag)
     fallback = {k: v for k, v in new.items() if k not in kept and not _is_shaping(k)}
     changed = dataclasses.replace(
         s,
         output_interval=float(data["output_interval"]),
         text=_text(data),
         controller=dataclasses.replace(
-            s.controller, inner=s.controller.inner.expecting(round(late / period))
+            s.controller,
+            inner=s.controller.inner.expecting(round(late / period)),
+            readings=Readings.of(lag, noisy=noisy),
         ),
         period=period,
         delay=late,
@@ -95,6 +102,7 @@ def altered(
         changed = changed.with_numbers(values, part)
     for part in ("inner", "errors"):
         changed = changed.with_numbers({"period": period}, part)
+    changed = changed.with_numbers(late_errors(lag), "errors").with_numbers(late_sensors(lag), "sensors")
     if s.noise is not None:
         noise = s.noise._replace(hold=_held(s.noise.hold, s.period) * period)
         changed = dataclasses.replace(changed, noise=noise).with_numbers({"noise_hold": noise.hold}, "errors")
@@ -167,6 +175,30 @@ def require_timing(
             needs=f"0 to {most} periods, {most * period:g} s at this rate",
         )
     return period, late
+
+
+def require_soon(late: Lateness) -> None:
+    """Raise ValueRangeError for sensors that are too many periods late."""
+    if max(late) > MOST_LATE * (1 + 1e-9):
+        raise ValueRangeError(
+            "delay of a sensor", got=f"{max(late):.4g} periods", needs=f"at most {MOST_LATE} periods"
+        )
+
+
+def later_sensors(problem: SampledProblem, lateness: Lateness) -> SampledProblem:
+    """Return the problem with sensors that are so late [s]."""
+    lag, controller = lateness.in_periods(problem.period), problem.controller
+    require_soon(lag)
+    data = read_back(problem.text)
+    data["sensors"] = dict(data.get("sensors") or {}) | dict(zip(DELAYS, map(float, lateness), strict=True))
+    readings = Readings.of(lag, noisy=controller.readings.noisy)
+    changed = dataclasses.replace(
+        problem,
+        lateness=lateness,
+        text=_text(data),
+        controller=dataclasses.replace(controller, readings=readings),
+    )
+    return changed.with_numbers(late_errors(lag), "errors").with_numbers(late_sensors(lag), "sensors")
 
 
 def _is_shaping(name: str) -> bool:

@@ -21,6 +21,7 @@ from passiflex.loops.plant import Elements
 from passiflex.loops.sampled_loop import SampledLoop
 from passiflex.parts import Parts
 from passiflex.sampled.controller import SampledController
+from passiflex.sampled.readings import ON_TIME, Lateness
 from passiflex.sampled.sensors import AbstractSensorEffect
 
 Array = NDArray[np.float64]
@@ -47,10 +48,17 @@ class Event(NamedTuple):
 
 
 class Noise(NamedTuple):
-    """White noise on the measured τ_a: variance [(N m)²], held for `hold` seconds each."""
+    """White noise on the measured τ_a: variance [(N m)²], held for `hold` seconds each; and on q and θ, per reading."""
 
     variance: float
     hold: float
+    link_deviation: float = 0.0
+    motor_deviation: float = 0.0
+
+    @property
+    def moves(self) -> bool:
+        """Return whether there is noise on positions."""
+        return self.link_deviation > 0 or self.motor_deviation > 0
 
 
 class TankStart(NamedTuple):
@@ -166,6 +174,7 @@ class SampledProblem(Problem):
     gain_changes: Of K_x and D_x, in the order of time.
     feedforward: Wrenches (6,) that the end effector is to exert.
     effects: On the readings, beside those of the sensors' own.
+    lateness: Of the sensors.
     """
 
     controller: SampledController
@@ -179,6 +188,7 @@ class SampledProblem(Problem):
     feedforward: tuple[Lasting, ...]
     effects: tuple[AbstractSensorEffect, ...] = ()
     lost: tuple[tuple[float, int], ...] = ()
+    lateness: Lateness = ON_TIME
 
     @cached_property
     def loop(self) -> SampledLoop:

@@ -117,10 +117,12 @@ def _checked(scenario: Scenario) -> Scenario:
 
 def _as_written(scenario: Scenario) -> dict[str, Any]:
     """Return what a problem has of its scenario as it is."""
+    noise = scenario.noise
     return {
         "name": scenario.name,
         "tank": tank_start(scenario),
-        "noise": Noise(scenario.noise.torque_variance, scenario.noise.hold) if scenario.noise else None,
+        "noise": noise
+        and Noise(noise.torque_variance, noise.hold, noise.link_deviation, noise.motor_deviation),
         "duration": scenario.duration,
         "output_interval": scenario.output_interval,
         "tolerance": scenario.tolerance,

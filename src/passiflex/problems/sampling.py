@@ -21,12 +21,14 @@ from passiflex.robots.flexible import FlexibleJointRobot
 from passiflex.sampled.controller import SampledController
 from passiflex.sampled.measurement_bound import BEND
 from passiflex.sampled.motors import UNLIMITED_TORQUE
+from passiflex.sampled.readings import Lateness, Readings
 from passiflex.sampled.sensors import UNFILTERED
 from passiflex.scenarios.action_settings import Actions
-from passiflex.scenarios.control_settings import Control, SensorSettings
+from passiflex.scenarios.control_settings import Control
 from passiflex.scenarios.motor_settings import MotorSettings
 from passiflex.scenarios.noise_settings import Noise
 from passiflex.scenarios.scenario import Scenario
+from passiflex.scenarios.sensor_settings import SensorSettings
 from passiflex.scenarios.setpoints import Table
 from passiflex.scenarios.tank_settings import TankSettings
 
@@ -67,15 +69,23 @@ def sampled_parts(
         For a list of numbers that does not fit the robot's joints.
     """
     tank, robot, model = scenario.tank, law.robot, known.model
+    motors, sensors, noise = (
+        scenario.motors or MotorSettings(),
+        scenario.sensors or SensorSettings(),
+        scenario.noise,
+    )
+    noisy = noise is not None and bool(noise.link_deviation or noise.motor_deviation)
+    late = sensors.lateness.in_periods(1 / control.rate)
     controller = SampledController(
         law,
         tank.build() if tank and law.has_tank else None,
         control.build_external(),
         control.build_inner(),
         actions=scenario.actions is not None or bool(feedforward_of(scenario, robot)),
+        compensates=scenario.actions is not None and scenario.actions.compensates,
         held_task=control.build_task(),
+        readings=Readings.of(late, noisy=noisy),
     )
-    motors, sensors = scenario.motors or MotorSettings(), scenario.sensors or SensorSettings()
     moved = np.diag(known.start.mass_matrix) + gains.get("shaped_inertia", model["motor_inertia"])
     loop = SampledLoop(controller, known.elements)
     numbers = loop.parameters.pack(
@@ -93,8 +103,8 @@ def sampled_parts(
                 "acceleration_gain": ACCELERATION_GAIN,
                 "task_periods": control.task_periods,
             },
-            "errors": _errors(control, sensors, scenario.noise, robot),
-            "sensors": _sensors(sensors, robot),
+            "errors": _errors(control, sensors, noise, robot) | late_errors(late),
+            "sensors": _sensors(sensors, robot) | late_sensors(late),
             "limits": _limits(motors, robot),
         }
     )
@@ -108,6 +118,7 @@ def sampled_parts(
         "lost": tuple((burst.at, burst.periods) for burst in control.lost),
         "allow_unstable": control.allow_unstable,
         "held": known.start.gravity_torque,
+        "lateness": sensors.lateness,
         "gain_changes": _gain_changes(scenario, gains),
         "feedforward": feedforward_of(scenario, robot),
     }
@@ -211,7 +222,21 @@ def _errors(
         "noise_credit": 0.0,  # of the loop: see `noise_credit.charged`
         "bend": BEND,
         "period": 1 / control.rate,
+        "link_deviation": noise.link_deviation if noise else 0.0,
+        "noise_debit": 0.0,
+        "jitter_mean": 0.0,  # of the loop as well: see `storage_jitter`
+        "jitter_share": 0.0,
     }
+
+
+def late_sensors(late: Lateness) -> dict[str, float]:
+    """Return the numbers of sensors that are so many periods late."""
+    return {f"{name}_late": periods for name, periods in late._asdict().items()}
+
+
+def late_errors(late: Lateness) -> dict[str, float]:
+    """Return what the books know of it."""
+    return {"late": max(late.link, late.torque), "pairing": abs(late.torque - late.link)}
 
 
 def _limits(motors: MotorSettings, robot: FlexibleJointRobot) -> dict[str, Array]:

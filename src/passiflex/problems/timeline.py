@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -13,17 +12,19 @@ from numpy.typing import NDArray
 from passiflex.control.motion import Motion, Pose, hold, pose_at, rebased
 from passiflex.problems.problem import Event
 from passiflex.scenarios.environment import labelled
+from passiflex.scenarios.forces import Acting
 from passiflex.scenarios.reference import AbstractReferenceEvent
 from passiflex.scenarios.scenario import Scenario
 from passiflex.scenarios.touching import Change
 
 Array = NDArray[np.float64]
+ZEROS = (0.0,) * 6
 
 
 def timeline(scenario: Scenario, home: Pose) -> tuple[Event, ...]:
     """Return the events in the order of time: each change of the reference or of what acts on the robot is one."""
     motions = _motions(scenario, home)
-    wrenches = _summed([(f.start, f.end, (*f.force, *f.moment)) for f in scenario.forces])
+    wrenches = _summed([acting for f in scenario.forces for acting in f.acting(scenario.duration)])
     felt = [entry.changes(label) for label, entry in labelled(scenario.environment).items()]
     changing = {change.time for changes in felt for change in changes} | wrenches.keys()
     acting, events = np.zeros(6), []
@@ -79,18 +80,21 @@ def with_motions(events: tuple[Event, ...], own: Sequence[AbstractReferenceEvent
     return tuple(found)
 
 
-def _summed(lasting: Sequence[tuple[float, float, tuple[float, ...]]]) -> dict[float, Array]:
-    """Return the sum of what acts from each instant on at which something begins or ends.
+def _summed(lasting: Sequence[Acting]) -> dict[float, Array]:
+    """Return the sum of what acts from each instant on at which something begins or ends, rounded once.
 
-    Its numbers are rounded sums of all that act: kept as fractions, nothing is left behind by what has ended.
+    It is made anew each time of all that act then, so that nothing is left behind by what has ended.
     """
-    changes: dict[float, list[tuple[int, tuple[float, ...]]]] = {}
-    for start, end, numbers in lasting:
-        changes.setdefault(start, []).append((1, numbers))
-        changes.setdefault(end, []).append((-1, numbers))
-    acting, out = [Fraction(0)] * len(lasting[0][2]) if lasting else [], {}
-    for time in sorted(changes):
-        for sign, numbers in changes[time]:
-            acting = [sum_ + sign * Fraction(part) for sum_, part in zip(acting, numbers, strict=True)]
-        out[time] = np.array([float(part) for part in acting])
+    begins: dict[float, list[int]] = {}
+    for i, acting in enumerate(lasting):
+        begins.setdefault(acting.start, []).append(i)
+        begins.setdefault(acting.end, []).append(~i)
+    now, out = dict[int, tuple[float, ...]](), {}
+    for time in sorted(begins):
+        for i in begins[time]:
+            if i < 0:
+                now.pop(~i, None)
+            else:
+                now[i] = lasting[i].wrench
+        out[time] = np.array([math.fsum(parts) + 0.0 for parts in zip(*now.values(), strict=True)] or ZEROS)
     return out

@@ -27,7 +27,8 @@ def unbooked(problem: Problem) -> str:
         causes.append("sampling")
     if not np.array_equal(problem.plant[: problem.model.size], problem.model):
         causes.append("model error")
-    if problem.noise is not None and problem.noise.variance > 0 and not own:
+    noise = problem.noise
+    if noise is not None and (noise.moves or (noise.variance > 0 and not own)):
         causes.append("noise")
     causes += [e.unknown for e in problem.elements if e.acts and e.unknown]
     return listed(causes) or NOTHING

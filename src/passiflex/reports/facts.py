@@ -18,6 +18,7 @@ from passiflex.scenarios.gain_settings import (
     TargetInertia,
 )
 from passiflex.scenarios.law_settings import ImpedanceSettings
+from passiflex.scenarios.sensor_settings import DELAYS, SensorSettings
 from passiflex.simulation import Run, Scenario, passed_limits
 from passiflex.texts.yaml_tree import RefusedText, Tree
 
@@ -132,7 +133,7 @@ def _world(scenario: Scenario) -> Iterator[tuple[str, str]]:
         yield (
             "sensors",
             f"q {_resolution(sensors.link_resolution)}, θ {_resolution(sensors.motor_resolution)}, "
-            f"velocities: {sensors.velocity}",
+            f"velocities: {sensors.velocity}" + "".join(_late(sensors)),
         )
     motors = scenario.motors
     if motors is not None:
@@ -140,10 +141,15 @@ def _world(scenario: Scenario) -> Iterator[tuple[str, str]]:
         rubbing = np.any(motors.coulomb_friction) or np.any(motors.viscous_friction)
         yield "motors", f"{limit}, {'with' if rubbing else 'no'} friction"
     noise = scenario.noise
-    if noise is not None:
+    if noise is not None and (noise.torque_variance or not (noise.link_deviation or noise.motor_deviation)):
         yield (
             "noise of τ_a",
             f"variance {noise.torque_variance:g} (N m)², each value held for {_seconds(noise.hold)}",
+        )
+    if noise is not None and (noise.link_deviation or noise.motor_deviation):
+        yield (
+            "noise of q, θ",
+            f"deviations {noise.link_deviation:g} and {noise.motor_deviation:g} rad, new in each period",
         )
     for label, relative in (
         ("robot is off by", scenario.deviations),
@@ -207,3 +213,10 @@ def _hertz(rate: float) -> str:
 
 def _seconds(time: float) -> str:
     return f"{time * 1000:.4g} ms" if time < 1 else f"{time:.4g} s"
+
+
+def _late(sensors: SensorSettings) -> Iterator[str]:
+    """Yield which sensors are late, and by how much."""
+    for symbol, entry in zip(("q", "θ", "τ_a", "F_e"), DELAYS, strict=True):
+        if late := getattr(sensors, entry):
+            yield f", {symbol} {_seconds(late)} late"

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from types import SimpleNamespace
 from typing import Any, final
 
 import casadi as cs
 
-from passiflex.control.law import AbstractLaw, Gains, Stored
+from passiflex.control.law import AbstractLaw, Stored
 from passiflex.control.signals import Command, Measurement, Reference
 from passiflex.layout import Field, Layout
 from passiflex.parts import Parts
 from passiflex.robots.arm import EndEffectorPose
 from passiflex.sampled.actions import action_layout, friction_compensation, gated_torque
+from passiflex.sampled.declared_errors import error_layout
 from passiflex.sampled.external import AbstractExternalTorque, Known, TrueTorque
 from passiflex.sampled.governor import govern_pose, govern_stiffness
 from passiflex.sampled.held_task import HeldTask
@@ -22,11 +22,12 @@ from passiflex.sampled.inner_loop import AbstractInnerLoop, PlainInnerLoop
 from passiflex.sampled.measurement_bound import (
     booked_bound,
     bound_state,
-    error_layout,
+    jitter,
     sure_state,
 )
-from passiflex.sampled.period import Commanded, Force, Granted, Read, Settled
+from passiflex.sampled.period import Commanded, Force, Granted, Read, Settled, chosen, chosen_pose
 from passiflex.sampled.period_state import period_after, period_start, period_state
+from passiflex.sampled.readings import EXACT, Readings
 from passiflex.sampled.rest import Remembered, Rest
 from passiflex.sampled.signals import ControlParameters, LedgerEntry, ObserverNumbers, PeriodResult, Setpoint
 from passiflex.sampled.tank import AbstractTank, PeriodFlows, added, finite, unchanged
@@ -52,8 +53,12 @@ class SampledController:
     inner: AbstractInnerLoop = field(default_factory=PlainInnerLoop)
     actions: bool = True
     """Whether anything acts that the valve gates: without, a third of the arithmetic is left out."""
+    compensates: bool = False
+    """Whether friction of the motors is made up for, if anything acts."""
     held_task: HeldTask | None = None
     """Set where the outer loop has a clock of its own, slower than that of the joints."""
+    readings: Readings = EXACT
+    """Which of them are late or noisy: the books pair them."""
 
     @cached_property
     def parameters(self) -> Parts:
@@ -77,7 +82,7 @@ class SampledController:
     def state(self) -> Layout:
         """Return what is remembered from one period to the next; energies are sums since the start."""
         n, k = self.law.robot.n, self.law.task.size
-        books = period_state(n, k) + bound_state(n) + sure_state(n)
+        books = period_state(n, k) + bound_state(n, self.readings) + sure_state(n, self.readings)
         return books + self.external.state(n) + self.inner.state(n) + self._of_the_command
 
     @property
@@ -86,12 +91,12 @@ class SampledController:
         n = self.law.robot.n
         given = Field("compensation", (n,), "N m", "against friction", kept=False, acts=True)
         held = self.held_task.state(n) if self.held_task else Layout(())
-        return Layout((given,)) + held if self.actions else held
+        return Layout((given,)) + held if self.compensates else held
 
     def start(self, at: Rest) -> Remembered:
         """Return what is remembered at rest, of each field of the state."""
         n, k = self.law.robot.n, self.law.task.size
-        bounds = (bound_state(n) + sure_state(n)).zeros()
+        bounds = (bound_state(n, self.readings) + sure_state(n, self.readings)).zeros()
         held = self.held_task.start(at) if self.held_task else {}
         command = self._of_the_command.zeros() | held
         return period_start(n, k, at) | bounds | self.external.start(at) | self.inner.start(at) | command
@@ -118,7 +123,10 @@ class SampledController:
         variable = self._potential(force.now, granted.pose, granted.stiffness - p.gains.stiffness)
         asked, floor = setpoint.pose.position, p.tank.tank_floor
         values = period_after(read, force, granted, asked, command, variable, floor, s)
-        own = Layout(self.state.fields[: len(values)])
+        own = period_state(self.law.robot.n, self.law.task.size) + bound_state(
+            self.law.robot.n, self.readings
+        )
+        own += sure_state(self.law.robot.n, self.readings)
         after = cs.vertcat(own.stack(values), read.observed, read.seen, kept)
         faulty = self.state.stack(vars(s) | {"faults": s.faults + 1, "lost_time": read.elapsed})
         safe = command._replace(tau_m=cs.if_else(ok, command.tau_m, s.last_command))
@@ -148,18 +156,21 @@ class SampledController:
         elapsed = s.lost_time + cs.if_else(finite(elapsed, below=LARGEST_READING), elapsed, 0)
         known = Known(self.law.robot.arm, p.model, p.observer.bandwidth)
         y, observed = self.external.estimate(y, elapsed, known, s)
-        moving = applied - s.compensation if self.actions else applied  # the rest is what friction takes
+        moving = applied - s.compensation if self.compensates else applied  # the rest is what friction takes
         y, seen = self.inner.see(y, moving, elapsed, s, p.model, p.inner)
         first = s.running < 1
-        return Read(y, elapsed, first, observed, seen, booked_bound(y, elapsed, first, s, p.errors))
+        paired = self.readings.pair(y, elapsed, first, s, p.errors)
+        bound = booked_bound(paired, elapsed, first, s, p.errors, self.readings)
+        return Read(y, elapsed, first, observed, seen, paired, bound)
 
     def _settle(self, r: Read, s: Any, p: ControlParameters) -> Settled:
         """Return the books after what the period before took or gave."""
         held = EndEffectorPose(s.governed_position, s.governed_rotation)
-        before = self.law.stored(r.y, p.model, _chosen(s.latched, p.fallback, p.gains))
-        storage = before.energy + self._potential(before, held, s.held_stiffness)
+        before = self.law.stored(r.y, p.model, chosen(s.latched, p.fallback, p.gains))
+        spring = self._potential(before, held, s.held_stiffness)
+        storage = before.energy + spring
         variable = self._potential(before, held, s.held_stiffness - p.gains.stiffness)
-        work = cs.if_else(r.first, 0, cs.dot(s.last_tau_a + r.y.tau_a, r.y.q - s.last_q) / 2)
+        work = cs.if_else(r.first, 0, cs.dot(s.last_tau_a + r.paired.tau_a, r.paired.q - s.last_q) / 2)
         flows = PeriodFlows(
             elapsed=r.elapsed,
             port_energy=work,
@@ -169,7 +180,14 @@ class SampledController:
             variable_spring_work=cs.if_else(r.first, 0, variable - s.variable_potential),
         )
         settled = self.tank.settle(s.tank_energy, flows, p.tank) if self.tank else unchanged(s.tank_energy)
-        return Settled(settled, work, storage, held)
+        shakes = cs.SX(0)
+        if self.readings.noisy:
+            quadratic = before.motor_kinetic + before.joint_spring + spring
+            carries = (
+                not before.gravity_storage.is_zero()
+            )  # whose slope at rest is that of the joints' springs
+            shakes = (1 + carries) * jitter(quadratic, p.errors)
+        return Settled(settled, work, storage, held, shakes)
 
     def _in_force(self, r: Read, settled: Settled, s: Any, p: ControlParameters) -> Force:
         """Return what is in force: the fallback from the period on in which the tank is overdrawn, T + S kept.
@@ -178,10 +196,13 @@ class SampledController:
         """
         tank, bound = settled.tank, r.bound
         falls = self.tank is not None and self.tank.falls_back
-        short = tank.level + bound.lowered < p.tank.tank_trip + s.sure_measurement_bound
+        lowered = bound.lowered
+        if self.readings.noisy:
+            lowered += p.errors.jitter_mean + settled.jitter + s.sure_storage_jitter
+        short = tank.level + lowered < p.tank.tank_trip + s.sure_measurement_bound
         overdrawn = cs.logic_and(short, s.latched < 1) if falls else cs.SX(0)
         latched = cs.fmax(s.latched, overdrawn)
-        gains = _chosen(latched, p.fallback, p.gains)
+        gains = chosen(latched, p.fallback, p.gains)
         now = self.law.stored(r.y, p.model, gains)
         restored = cs.if_else(overdrawn, now.energy, settled.storage)  # slack at the pose just read
         rebased = cs.if_else(overdrawn, settled.storage - restored, 0)
@@ -189,14 +210,15 @@ class SampledController:
             now=now,
             gains=gains,
             latched=latched,
-            held=_pose(overdrawn, now.pose, settled.held),
+            held=chosen_pose(overdrawn, now.pose, settled.held),
             held_stiffness=cs.if_else(overdrawn, p.fallback.stiffness, s.held_stiffness),
             storage=restored,
             rebased=rebased,
             tank=tank._replace(level=tank.level + rebased),
             lowest=tank.level,
             work=settled.work,
-            doubt=bound.total if self.tank is not None and self.tank.measures else cs.SX(0),
+            doubt=bound.total + settled.jitter if self.tank is not None and self.tank.measures else cs.SX(0),
+            jitter=settled.jitter,
         )
 
     def _command(
@@ -217,6 +239,7 @@ class SampledController:
         torque = against = cs.SX.zeros(self.law.robot.n)
         if self.actions:
             torque += valve * gated_torque(self.law, r.y, f.now, setpoint, granted, g, p)
+        if self.compensates:
             against = valve * friction_compensation(r.y.dtheta, p.actions)
         if self.tank:
             torque -= self.tank.braking(level, cs.dot(f.now.dphi, f.now.dphi), r.elapsed, p.tank) * f.now.dphi
@@ -258,7 +281,7 @@ class SampledController:
         stiffness = govern_stiffness(task, f.now.pose, f.held, f.held_stiffness, wanted, budget, signed)
         first = tank.pay(level, stiffness.cost, p.tank)
         budget = cs.fmax(budget - first.granted, 0)
-        goal = _pose(f.latched, f.held, setpoint.pose)
+        goal = chosen_pose(f.latched, f.held, setpoint.pose)
         pose = govern_pose(task, f.now.pose, f.held, goal, stiffness.value, budget, signed)
         second = tank.pay(first.level, pose.cost, p.tank)
         return Granted(
@@ -269,13 +292,3 @@ class SampledController:
             cost=stiffness.cost + pose.cost,
             entry=added(first, second),
         )
-
-
-def _chosen(flag: cs.SX, then: Gains, other: Gains) -> Gains:
-    return SimpleNamespace(**{k: cs.if_else(flag, v, getattr(other, k)) for k, v in vars(then).items()})
-
-
-def _pose(flag: cs.SX, then: EndEffectorPose, other: EndEffectorPose) -> EndEffectorPose:
-    return EndEffectorPose(
-        cs.if_else(flag, then.position, other.position), cs.if_else(flag, then.rotation, other.rotation)
-    )

@@ -32,8 +32,10 @@ def period_state(n: int, k: int) -> Layout:
             Field("variable_potential", (), "J", "U(K_x) − U(K_base)", kept=False),
             Field("claimed_power", (), "W", "P_D that the law claims", kept=False),
             Field("claimed_cartesian_power", (), "W", "its part in D_x", kept=False),
-            Field("last_q", (n,), "rad", "measured q of the last period", kept=False),
-            Field("last_tau_a", (n,), "N m", "measured τ_a of the last period", kept=False),
+            Field("last_q", (n,), "rad", "measured q of the last period, as the books have it", kept=False),
+            Field(
+                "last_tau_a", (n,), "N m", "measured τ_a of the last period, as the books have it", kept=False
+            ),
             Field("last_command", (n,), "N m", "τ_m of the last period", kept=False),
             Field("running", (), "1", "0 before the first period", kept=False),
             Field("latched", (), "1", "1 once the law has fallen back"),
@@ -81,6 +83,7 @@ def period_after(
     tank = added(f.tank, granted.entry)
     held_back = cs.logic_or(granted.pose_share < 1, granted.stiffness_share < 1)
     is_sure = cs.logic_or(r.first, f.lowest - r.bound.total >= floor)
+    known = r.bound.state | {"storage_jitter": f.jitter}
     return {
         "governed_position": granted.pose.position,
         "governed_rotation": granted.pose.rotation,
@@ -90,8 +93,8 @@ def period_after(
         "variable_potential": variable,
         "claimed_power": command.energy.dissipated_power,
         "claimed_cartesian_power": command.energy.cartesian_damping,
-        "last_q": r.y.q,
-        "last_tau_a": r.y.tau_a,
+        "last_q": r.paired.q,
+        "last_tau_a": r.paired.tau_a,
         "last_command": command.tau_m,
         "running": 1,
         "latched": f.latched,
@@ -107,6 +110,6 @@ def period_after(
         "largest_lag": cs.fmax(s.largest_lag, cs.norm_2(asked - granted.pose.position)),
         "faults": s.faults + cs.fmin(tank.fault, 1),
         "lost_time": 0,
-        **r.bound.state,
-        **sure(is_sure, r.y.q, s, r.bound.state),
+        **known,
+        **sure(is_sure, r.paired.q, s, known),
     }

@@ -1,4 +1,4 @@
-"""What a robot's sensors make of the truth: scale, offset, noise, bandwidth, resolution, differences."""
+"""What a robot's sensors make of the truth: scale, offset, noise, bandwidth, resolution, differences, delay."""
 
 from __future__ import annotations
 
@@ -7,9 +7,11 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
 import casadi as cs
+import numpy as np
 
 from passiflex.control.signals import Measurement
 from passiflex.layout import Field, Layout
+from passiflex.sampled.readings import EXACT, Readings, delayed
 from passiflex.sampled.rest import Remembered, Rest
 
 UNFILTERED = 1e9
@@ -54,6 +56,18 @@ class SensorNumbers(Protocol):
     velocity_bandwidth: cs.SX
     torque_bandwidth: cs.SX
     wrench_bandwidth: cs.SX
+    link_late: cs.SX
+    motor_late: cs.SX
+    torque_late: cs.SX
+    wrench_late: cs.SX
+
+
+class Noise(NamedTuple):
+    """What is added to τ_a, q and θ in one period (n,); 0 where nothing is."""
+
+    torque: cs.SX
+    link: cs.SX | float = 0.0
+    motor: cs.SX | float = 0.0
 
 
 class AbstractSensorEffect(abc.ABC):
@@ -81,17 +95,19 @@ class AbstractSensorEffect(abc.ABC):
 
 @dataclass(frozen=True)
 class Sensors:
-    """The sensors of one robot, in this order: scale, offset, noise, bandwidth, resolution; velocities come last.
+    """The sensors of one robot, in this order: scale, offset, noise, bandwidth, resolution, velocities, delay.
 
-    Then `effects` of somebody's own.
+    Then `effects` of somebody's own. `readings` says which of them have noise or are late.
 
     All numbers are parameters: 0 switches a scale error, an offset or a resolution off, `UNFILTERED` a
     bandwidth, and `velocity_differences` 0 gives the true velocities. Scale and offset stay what they are
-    for the whole run. Nothing here knows what the law does.
+    for the whole run. A sensor that is late hands out, in each period in which the law runs, what it read so many
+    such periods ago, linear between two of them. Nothing here knows what the law does.
     """
 
     n: int
     effects: tuple[AbstractSensorEffect, ...] = ()
+    readings: Readings = EXACT
 
     @property
     def layout(self) -> Layout:
@@ -109,6 +125,10 @@ class Sensors:
                 Field("velocity_bandwidth", (), "rad/s", "pole of the low-pass of the differences"),
                 Field("torque_bandwidth", (), "rad/s", "pole of the joint torque sensor"),
                 Field("wrench_bandwidth", (), "rad/s", "pole of the wrench sensor"),
+                Field("link_late", (), "1", "periods by which q and q̇ are late"),
+                Field("motor_late", (), "1", "the same of θ and θ̇"),
+                Field("torque_late", (), "1", "the same of τ_a"),
+                Field("wrench_late", (), "1", "the same of F_e"),
             ),
             SensorNumbers,
         )
@@ -116,7 +136,8 @@ class Sensors:
     @property
     def state(self) -> Layout:
         """Return what is remembered from one sample to the next."""
-        return sum((effect.state(self.n) for effect in self.effects), self._own)
+        own = self._own + self.readings.sensor_state(self.n)
+        return sum((effect.state(self.n) for effect in self.effects), own)
 
     @property
     def _own(self) -> Layout:
@@ -141,18 +162,22 @@ class Sensors:
             "read_theta": at.running * at.theta,
             "read_tau_a": at.running * at.tau_a,
         }
+        late = self.readings.sensor_state(self.n)
+        still = {"late_q": at.q, "late_theta": at.theta, "late_tau_a": at.tau_a}
+        own |= late.zeros()
+        own |= {f.name: np.tile(at.running * still[f.name], (f.shape[0], 1)) for f in late if f.name in still}
         return own | {k: v for e in self.effects for k, v in e.start(at).items()}
 
-    def read(
-        self, truth: Measurement, torque_noise: cs.SX, elapsed: cs.SX, s: Any, g: SensorNumbers
-    ) -> Reading:
+    def read(self, truth: Measurement, noise: Noise, elapsed: cs.SX, s: Any, g: SensorNumbers) -> Reading:
         """Return the reading of the truth, `elapsed` seconds after the last one."""
         first = s.started < 1
-        noisy = (1 + g.torque_scale) * truth.tau_a + g.torque_offset + torque_noise
+        noisy = (1 + g.torque_scale) * truth.tau_a + g.torque_offset + noise.torque
         tau_a = cs.if_else(first, noisy, low_pass(s.read_tau_a, noisy, g.torque_bandwidth, elapsed))
         F_e = cs.if_else(first, truth.F_e, low_pass(s.read_wrench, truth.F_e, g.wrench_bandwidth, elapsed))
-        q = quantised(truth.q + g.link_offset, g.link_resolution)
-        theta = quantised(truth.theta + g.motor_offset, g.motor_resolution)
+        q, theta = truth.q + g.link_offset, truth.theta + g.motor_offset
+        if self.readings.noisy:
+            q, theta = q + noise.link, theta + noise.motor
+        q, theta = quantised(q, g.link_resolution), quantised(theta, g.motor_resolution)
 
         def velocity(true: cs.SX, now: cs.SX, last: cs.SX, filtered: cs.SX) -> tuple[cs.SX, cs.SX]:
             rate = cs.if_else(first, 0, difference(last, now, elapsed))
@@ -172,8 +197,22 @@ class Sensors:
                 "read_wrench": F_e,
             }
         )
-        y = Measurement(q, theta, dq, dtheta, tau_a, F_e, truth.tau_e)
+        y, kept = self._late(Measurement(q, theta, dq, dtheta, tau_a, F_e, truth.tau_e), first, s, g)
+        state = cs.vertcat(state, kept)
         for effect in self.effects:
             y, own = effect.read(y, elapsed, s)
             state = cs.vertcat(state, own)
         return Reading(y, state)
+
+    def _late(self, y: Measurement, first: cs.SX, s: Any, g: SensorNumbers) -> tuple[Measurement, cs.SX]:
+        """Return what is handed out of what was read, and what is kept back."""
+        rings = self.readings.sensor_state(self.n)
+        kept: dict[str, cs.SX] = {}
+        periods = {"q": g.link_late, "dq": g.link_late, "theta": g.motor_late, "dtheta": g.motor_late}
+        periods |= {"tau_a": g.torque_late, "wrench": g.wrench_late}
+        for ring in rings:
+            name = ring.name.removeprefix("late_")
+            field = "F_e" if name == "wrench" else name
+            found = delayed(getattr(s, ring.name), getattr(y, field), periods[name], first)
+            y, kept[ring.name] = y._replace(**{field: found.value}), found.past
+        return y, rings.stack(kept)

@@ -11,8 +11,8 @@ from passiflex.control.signals import Command, Measurement
 from passiflex.robots.arm import EndEffectorPose
 from passiflex.robots.flexible import RobotNumbers
 from passiflex.sampled.actions import ActionNumbers
+from passiflex.sampled.declared_errors import ErrorNumbers
 from passiflex.sampled.inner_loop import InnerNumbers
-from passiflex.sampled.measurement_bound import ErrorNumbers
 from passiflex.sampled.tank import TankEntry, TankNumbers
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
+import numpy as np
 from pydantic import Field
 
 from passiflex.scenarios.control_settings import PerJoint, Share, Vector
@@ -36,6 +37,11 @@ class Actions(Section):
     compensation_width: Annotated[float, Quantity("rad/s", above=0)] = Field(
         default=0.01, description="speed over which the former changes its sign, rad/s"
     )
+
+    @property
+    def compensates(self) -> bool:
+        """Return whether any friction is made up for."""
+        return bool(np.any(self.coulomb_compensation) or np.any(self.viscous_compensation))
 
 
 class Feedforward(TimeSpan):

@@ -28,7 +28,6 @@ Vector = tuple[float, ...]
 Found = list[tuple[tuple[str | int, ...], str]]
 """Mistakes, each with its place."""
 Frequency = Annotated[float, Quantity("Hz", above=0, finite=False)]
-Angle = Annotated[float, Quantity("rad", least=0)]
 Share = Annotated[float, Quantity("1", least=0, most=1)]
 PerJoint = ((), (None,))
 ENDLESS = float("inf")
@@ -165,41 +164,6 @@ class Control(Section):
             needs = f"delay and jitter together are at most {most} periods{whose}"
             raise Mistakes(((written,), f"{needs}; got {periods:.4g} periods"))
         return self
-
-
-class SensorSettings(Section):
-    """What the sensors make of the truth; without it they tell the truth.
-
-    Offsets and scale stay what they are for the whole run. The controller is not corrected for them: its
-    books know how large they may be, not their sign.
-    """
-
-    torque_offset: Annotated[float | Vector, Quantity("N m", PerJoint)] = Field(
-        default=0.0, description="τ_a is read this much too high, one number for all joints or one each, N m"
-    )
-    torque_scale: Annotated[float | Vector, Quantity("1", PerJoint, least=-0.5, most=0.5)] = Field(
-        default=0.0, description="τ_a is read 1 + this times as large, one number or one each"
-    )
-    link_offset: Annotated[float | Vector, Quantity("rad", PerJoint)] = Field(
-        default=0.0, description="q is read this much too high, one number or one each, rad"
-    )
-    motor_offset: Annotated[float | Vector, Quantity("rad", PerJoint)] = Field(
-        default=0.0, description="θ is read this much too high, one number or one each, rad"
-    )
-    link_resolution: Angle = Field(default=0.0, description="resolution of q, rad; 0 for none")
-    motor_resolution: Angle = Field(default=0.0, description="resolution of θ, rad; 0 for none")
-    velocity: Literal["true", "differences"] = Field(
-        default="true", description="q̇ and θ̇: the truth, or differences of the position readings"
-    )
-    velocity_filter: Frequency = Field(
-        default=ENDLESS, description="pole of the low-pass of the differences, Hz; inf for none"
-    )
-    torque_bandwidth: Frequency = Field(
-        default=ENDLESS, description="pole of the joint torque sensors, Hz; inf for none"
-    )
-    wrench_bandwidth: Frequency = Field(
-        default=ENDLESS, description="pole of the wrench sensor, Hz; inf for none"
-    )
 
 
 class GainChange(Section):

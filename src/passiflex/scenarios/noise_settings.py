@@ -4,23 +4,51 @@ from __future__ import annotations
 
 from typing import Annotated, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from passiflex.texts.quantity import Quantity
 from passiflex.texts.section import Mistakes, Section
 
+Deviation = Annotated[float, Quantity("rad", least=0)]
+SAID = ("torque_variance", "link_deviation", "motor_deviation")
+
 
 class Noise(Section):
-    """White noise on the measured joint torque, held between samples."""
+    """White noise of the sensors: on the measured joint torque, held between samples, and on positions."""
 
     torque_variance: Annotated[float, Quantity("(N m)^2", least=0)] = Field(
-        description="variance per joint, (N m)^2"
+        default=0.0, description="variance per joint, (N m)^2"
     )
+    link_deviation: Deviation = Field(
+        default=0.0,
+        description="standard deviation of the readings of q, new in each period, rad; with control only",
+    )
+    motor_deviation: Deviation = Field(default=0.0, description="the same of θ, rad; with control only")
     hold: Annotated[float, Quantity("s", above=0)] = Field(
         default=0.001,
-        description="time between two samples, s; with control a whole multiple of the period, "
+        description="time between two samples of the torque's noise, s; with control a whole multiple of the period, "
         "and the nearest one if left out",
     )
+
+    @model_validator(mode="after")
+    def _of_something(self) -> Self:
+        if not self.model_fields_set & set(SAID):
+            raise Mistakes(
+                (
+                    ("torque_variance",),
+                    "missing: variance per joint, (N m)^2; or link_deviation, motor_deviation, of positions",
+                )
+            )
+        return self
+
+    def require_torque_only(self) -> None:
+        """Raise Mistakes for noise on positions, which only sensors that are read have."""
+        if found := [
+            ((name,), "needs `control`: in continuous time nothing is read")
+            for name in SAID[1:]
+            if getattr(self, name)
+        ]:
+            raise Mistakes(*found)
 
     def fitted(self, rate: float) -> Self:
         """Return the noise with a sample held for whole periods of this rate [Hz], the nearest if none was asked for.

@@ -12,38 +12,32 @@ from passiflex.scenarios.carried import Payload, Tool
 from passiflex.scenarios.control_settings import (
     Control,
     GainChange,
-    SensorSettings,
     change_mistakes,
     gain_mistakes,
 )
 from passiflex.scenarios.environment import Touching, as_drags, labelled
 from passiflex.scenarios.events import ReferenceEvent, event_mistakes, turning
+from passiflex.scenarios.forces import AnyForce, Force, WrenchTable, as_forces
 from passiflex.scenarios.law_settings import LawSettings
 from passiflex.scenarios.model_errors import Deviations, ModelErrors
 from passiflex.scenarios.motor_settings import MotorSettings
 from passiflex.scenarios.noise_settings import Noise
 from passiflex.scenarios.posture import StartPosture
-from passiflex.scenarios.reference import ZERO
 from passiflex.scenarios.row_interval import fitting_interval, interval_mistake
+from passiflex.scenarios.sensor_settings import SensorSettings
 from passiflex.scenarios.setpoints import Table, as_events
-from passiflex.scenarios.spans import Seconds, TimeSpan
+from passiflex.scenarios.spans import Seconds
 from passiflex.scenarios.tank_settings import TankSettings
 from passiflex.scenarios.touching import Hand
 from passiflex.texts.quantity import Quantity
 from passiflex.texts.section import Mistakes, Section
 
-Vector = tuple[float, ...]
 
-
-class Force(TimeSpan):
-    """A constant wrench on the end effector for some time; wrenches that overlap add up."""
-
-    force: Annotated[Vector, Quantity("N", ((3,),))] = Field(
-        default=ZERO, description="force in world axes, N"
-    )
-    moment: Annotated[Vector, Quantity("N m", ((3,),))] = Field(
-        default=ZERO, description="moment in world axes, N m"
-    )
+def _begins(entry: Any) -> tuple[str, float]:
+    """Return the entry that says when something begins, and that [s]."""
+    if isinstance(entry, GainChange):
+        return "at", entry.at
+    return entry.begins if isinstance(entry, Force | WrenchTable) else ("from", entry.lasts[0])
 
 
 def _own_tank(data: dict[str, Any]) -> TankSettings | None:
@@ -85,7 +79,9 @@ class Scenario(Section):
     reference: tuple[ReferenceEvent, ...] = Field(
         default=(), description="what the reference does, in the order of time; or `{table: FILE.csv}`"
     )
-    forces: tuple[Force, ...] = Field(default=(), description="external forces on the end effector")
+    forces: tuple[AnyForce, ...] = Field(
+        default=(), description="external forces on the end effector; an entry may be `{table: FILE.csv}`"
+    )
     deviations: Deviations = Field(
         default=Deviations(), description="by how much the robot differs from its description"
     )
@@ -94,7 +90,7 @@ class Scenario(Section):
     )
     noise: Noise | None = Field(
         default=None,
-        description="noise on the measured joint torque, which the rigid law does not use; none if left out",
+        description="noise of the sensors; the rigid law does not use the joint torque; none if left out",
     )
     sensors: SensorSettings | None = Field(default=None, description="sensors, with control only")
     motors: MotorSettings | None = Field(default=None, description="motors; limits with control only")
@@ -230,9 +226,23 @@ class Scenario(Section):
     @classmethod
     def _whole_periods(cls, noise: Noise | None, info: ValidationInfo) -> Noise | None:
         control = info.data.get("control")
-        if noise is not None and control is not None:
-            return noise.fitted(control.rate)
-        return noise
+        if noise is None:
+            return None
+        if info.data.get("control", "in error") is None:
+            noise.require_torque_only()
+        return noise.fitted(control.rate) if control is not None else noise
+
+    @field_validator("sensors")
+    @classmethod
+    def _not_too_late(cls, sensors: SensorSettings | None, info: ValidationInfo) -> SensorSettings | None:
+        if sensors is not None and (control := info.data.get("control")) is not None:
+            sensors.require_soon(control.rate)
+        return sensors
+
+    @field_validator("forces", mode="before")
+    @classmethod
+    def _force_alone(cls, written: Any) -> Any:
+        return as_forces(written)
 
     @field_validator("reference", mode="before")
     @classmethod
@@ -253,7 +263,7 @@ class Scenario(Section):
     @classmethod
     def _within_the_run(cls, entries: tuple[Any, ...], info: ValidationInfo) -> tuple[Any, ...]:
         end = info.data.get("duration", float("inf"))
-        begin = [("at", e.at) if isinstance(e, GainChange) else ("from", e.lasts[0]) for e in entries]
+        begin = [_begins(e) for e in entries]
         needs = f"needs to be earlier than the end, {end:g} s"
         late = [((i, name), f"{needs}; got {t:g} s") for i, (name, t) in enumerate(begin) if not t < end]
         if late:

@@ -17,6 +17,8 @@ from passiflex.texts.quantity import shown
 from passiflex.texts.text_file import IN_YAML, UnreadableError, decoded, is_path, read_bytes
 from passiflex.texts.yaml_tree import Place, RefusedText, Tree
 
+WITH_TABLES = ("reference", "forces")
+"""Entries of a scenario that may name the files of tables."""
 A_SCENARIO = "a scenario needs at least name, robot, posture, law and duration"
 
 
@@ -95,7 +97,7 @@ def parse_scenario(
 ) -> Scenario:
     """Return the scenario of a YAML text; `source` names it in errors, `base_dir` is where its files are.
 
-    Without `opens` a file that it names is not opened, and a scenario whose reference needs one has a mistake.
+    Without `opens` a file that it names is not opened, and a scenario that needs one for a table has a mistake.
 
     Raises
     ------
@@ -103,10 +105,11 @@ def parse_scenario(
         With one line for each mistake: line, column, name, what is wrong and what to do.
     """
     data, tree = read_tree(text, "scenario", A_SCENARIO, source)
-    if not opens and (named := _named(data.get("reference"))):
-        raise ScenarioError(
-            source, [f"reference: the table {shown(named)} is not opened; its rows are not here"]
-        )
+    for entry in WITH_TABLES if not opens else ():
+        if named := _named(data.get(entry)):
+            raise ScenarioError(
+                source, [f"{entry}: the table {shown(named)} is not opened; its rows are not here"]
+            )
     scenario = read_scenario(data, tree, (), base_dir)
     if tree.mistakes or scenario is None:
         raise ScenarioError(source, tree.lines())
@@ -131,19 +134,19 @@ def read_tree(text: str, kind: str, needs: str, source: str) -> tuple[dict[str, 
     return data, tree
 
 
-def _named(reference: Any) -> Any:
-    """Return the first file of a table that a reference names; None if there is none."""
-    events = reference if isinstance(reference, list) else [reference]
+def _named(written: Any) -> Any:
+    """Return the first file of a table that an entry, or a list of them, names; None if there is none."""
+    events = written if isinstance(written, list) else [written]
     return next((e["table"] for e in events if isinstance(e, dict) and e.get("table")), None)
 
 
-def _found(reference: Any, folder: Path) -> Any:
-    """Return a reference whose tables are named by paths that are found from anywhere."""
-    if isinstance(reference, list):
-        return [_found(event, folder) for event in reference]
-    if isinstance(reference, dict) and isinstance(name := reference.get("table"), str) and name.strip():
-        return reference | {"table": str(folder / name)}
-    return reference
+def _found(written: Any, folder: Path) -> Any:
+    """Return what was written with tables that are named by paths that are found from anywhere."""
+    if isinstance(written, list):
+        return [_found(event, folder) for event in written]
+    if isinstance(written, dict) and isinstance(name := written.get("table"), str) and name.strip():
+        return written | {"table": str(folder / name)}
+    return written
 
 
 def read_scenario(
@@ -154,7 +157,7 @@ def read_scenario(
     if base_dir is not None and isinstance(robot, str) and is_path(robot):
         data["robot"] = str(Path(base_dir) / robot)
     if base_dir is not None:
-        data |= {"reference": _found(data["reference"], Path(base_dir))} if "reference" in data else {}
+        data |= {entry: _found(data[entry], Path(base_dir)) for entry in WITH_TABLES if entry in data}
     try:
         return Scenario.model_validate(data)
     except ValidationError as error:

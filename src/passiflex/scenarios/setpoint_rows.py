@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from passiflex.texts.model_mistakes import suggested
-from passiflex.texts.number_table import NumberTable, parsed, unpacked
+from passiflex.texts.number_table import NumberTable
+from passiflex.texts.timed_table import columns, timed_table
 
 Array = NDArray[np.float64]
 
@@ -81,12 +81,10 @@ def setpoint_rows(text: str) -> SetpointRows:
     UnreadableError
         For packed rows that are damaged.
     """
-    table = parsed(unpacked(text))
-    _require_names(table)
-    time = _columns(table, ("t",))
+    table = timed_table(text, KNOWN, "t, x,y,z, qx..qw, rx..rz, kx.., dx..")
+    time = columns(table, ("t",))
     assert time is not None
-    _require_order(time[:, 0], table.lines)
-    quaternion, turn = _columns(table, QUATERNION), _columns(table, TURN)
+    quaternion, turn = columns(table, QUATERNION), columns(table, TURN)
     if quaternion is not None and turn is not None:
         raise ValueError("has both qx..qw and rx..rz: an orientation is given in one way; remove one")
     if quaternion is not None:
@@ -95,10 +93,10 @@ def setpoint_rows(text: str) -> SetpointRows:
         turn = _quaternions(turn)
     rows = SetpointRows(
         time[:, 0],
-        _columns(table, POSITION),
+        columns(table, POSITION),
         turn,
-        _columns(table, VELOCITY),
-        _columns(table, SPIN),
+        columns(table, VELOCITY),
+        columns(table, SPIN),
         _gains(table, "k"),
         _gains(table, "d"),
         table.lines,
@@ -146,43 +144,6 @@ def gain_mistake(rows: SetpointRows, size: int, free: tuple[int, ...]) -> str:
     return ""
 
 
-def _require_names(table: NumberTable) -> None:
-    for name in table.names:
-        if name not in KNOWN:
-            if (bare := re.sub(r"\s*[\[(].*", "", name)) in KNOWN:
-                raise ValueError(
-                    f"unknown column {name!r}; try {bare!r}: columns are in SI units, without one"
-                )
-            hint = (
-                suggested(name, KNOWN) if len(name) > 1 else "known are t, x,y,z, qx..qw, rx..rz, kx.., dx.."
-            )
-            raise ValueError(f"unknown column {name!r}; {hint}")
-    if "t" not in table.names:
-        raise ValueError("has no column t, the time in s; add it")
-
-
-def _require_order(time: Array, lines: NDArray[np.int64]) -> None:
-    if time[0] < 0:
-        raise ValueError(f"line {lines[0]}, column t: {time[0]:g} s is before the start; begin at 0 or later")
-    if (back := np.flatnonzero(np.diff(time) <= 0)).size:
-        i = int(back[0])
-        what = "repeats" if time[i + 1] == time[i] else "goes back"
-        raise ValueError(
-            f"line {lines[i + 1]}, column t: the time {what}, {time[i + 1]:.9g} s after {time[i]:.9g} s; "
-            "sort the rows by t, each instant once"
-        )
-
-
-def _columns(table: NumberTable, names: tuple[str, ...]) -> Array | None:
-    """Return the columns of these names, (N, k); None if none is there."""
-    there = [name for name in names if name in table.names]
-    if not there:
-        return None
-    if missing := [name for name in names if name not in there]:
-        raise ValueError(f"has {', '.join(there)} without {', '.join(missing)}; add what is missing")
-    return table.numbers[:, [table.names.index(name) for name in names]]
-
-
 def _unit(quaternion: Array, lines: NDArray[np.int64]) -> Array:
     length = np.linalg.norm(quaternion, axis=1)
     if (bad := np.flatnonzero(np.abs(length - 1) > UNIT_LENGTH)).size:
@@ -210,10 +171,10 @@ def _gains(table: NumberTable, letter: str) -> Array | None:
         raise ValueError(f"has both {there[0]} and {in_full[0]}: a matrix is given in one way; remove one")
     if in_full:
         size = 6 if any(set(name[1:]) & set("456") for name in in_full) else 3
-        numbers = _columns(table, _full(letter, size))
+        numbers = columns(table, _full(letter, size))
         assert numbers is not None
         return numbers.reshape(-1, size, size)
     size = 6 if any(name[1] == "r" for name in there) else 3
-    numbers = _columns(table, _diagonal(letter, size))
+    numbers = columns(table, _diagonal(letter, size))
     assert numbers is not None
     return numbers[:, :, None] * np.eye(size)

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, Self
 
 import numpy as np
@@ -14,7 +12,7 @@ from pydantic import BeforeValidator, Field, model_validator
 from passiflex.scenarios.reference import KINDS, AbstractReferenceEvent
 from passiflex.scenarios.setpoint_rows import SetpointRows, setpoint_rows
 from passiflex.scenarios.spans import Instant
-from passiflex.texts.number_table import packed, read_table_text
+from passiflex.scenarios.table_rows import in_file, with_rows
 from passiflex.texts.quantity import Quantity, shown
 from passiflex.texts.section import Mistakes, Section
 from passiflex.texts.text_file import UnreadableError
@@ -91,23 +89,7 @@ class Table(AbstractReferenceEvent):
     def _read(cls, written: Any) -> Any:
         if not isinstance(written, dict):
             return written
-        data = dict(written)
-        name, source = data.pop("table", None) or None, "rows"
-        rows: Any = data.get("rows")
-        if name is None and rows is None:
-            raise Mistakes((("table",), "missing: path of a CSV file"))
-        if name is not None and (not isinstance(name, str | os.PathLike) or not str(name).strip()):
-            raise Mistakes((("table",), f"expected the path of a CSV file; got {shown(name)}"))
-        if name is None and not isinstance(rows, str):
-            raise Mistakes((("rows",), f"expected the text of a table; got {shown(rows)}"))
-        try:
-            if name is not None:
-                data["source"] = source = Path(name).name
-                rows = read_table_text(Path(name))
-            data["rows"] = packed(rows)
-        except UnreadableError as error:
-            raise Mistakes((("table",), f"{source} cannot be read: {error}")) from None
-        return data
+        return with_rows(written)
 
     @model_validator(mode="after")
     def _in_order(self) -> Self:
@@ -131,8 +113,7 @@ class Table(AbstractReferenceEvent):
 
     def where(self, mistake: str) -> str:
         """Return a mistake of the rows with the name of their file."""
-        name = self.source or "rows"
-        return f"{name}{', ' if mistake.startswith('line') else ': '}{mistake}"
+        return in_file(self.source, mistake)
 
     @property
     def numbers(self) -> SetpointRows:

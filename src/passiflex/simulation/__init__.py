@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from passiflex.simulation.setpoint_arrays import setpoint_table as setpoint_table
     from passiflex.simulation.simulated import simulate as simulate
     from passiflex.simulation.through_time import simulate_problem as simulate_problem
+    from passiflex.simulation.wrench_arrays import wrench_table as wrench_table
 
 _HOMES = {
     "ClosedLoop": ".loops.closed_loop",
@@ -37,6 +38,7 @@ _HOMES = {
     "resolve": ".problems.resolution",
     "salvage": ".runs.salvaged",
     "setpoint_table": "setpoint_arrays",
+    "wrench_table": "wrench_arrays",
     "simulate": "simulated",
     "simulate_problem": "through_time",
 }

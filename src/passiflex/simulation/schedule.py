@@ -12,11 +12,14 @@ from passiflex.control.motion import Motion
 from passiflex.loops.period_row import PeriodRow
 from passiflex.native import NativeFunction
 from passiflex.problems.problem import GainChange, SampledProblem
+from passiflex.scenarios.setpoints import OF_STREAM
 
 Array = NDArray[np.float64]
 
 NOW = 1e-9
 """Two instants closer than this are one [s]."""
+OF_POSITIONS = OF_STREAM + 1
+"""Which random streams of a run's seed draw the noise of q and θ: this one and the next."""
 
 
 class Scheduled(NamedTuple):
@@ -39,14 +42,15 @@ def schedule(problem: SampledProblem, row: PeriodRow) -> list[Scheduled]:
 class Chance:
     """The chance of one run, made chunk by chunk: noise, and which periods are late or missed.
 
-    Noise, jitter and missed periods have a random stream each, so that one of them changes nothing about
-    the others.
+    Noise of τ_a, jitter, missed periods, and noise of q and of θ have a random stream each, so that one of them
+    changes nothing about the others.
     """
 
     def __init__(self, problem: SampledProblem, row: PeriodRow):
         self.problem, self.row = problem, row
-        streams = np.random.SeedSequence(problem.seed).spawn(3)
-        self.noise, self.late, self.lost = (np.random.default_rng(s) for s in streams)
+        streams = np.random.SeedSequence(problem.seed).spawn(OF_POSITIONS + 2)
+        self.noise, self.late, self.lost = (np.random.default_rng(s) for s in streams[:3])
+        self.link, self.motor = (np.random.default_rng(s) for s in streams[OF_POSITIONS:])
         self.since = 1  # periods since the law last ran
         self.held: Array = np.zeros((0, row.n))  # the noise that lasts into the next chunk
 
@@ -67,6 +71,10 @@ class Chance:
         at = self.row.drawn.slices
         if self.problem.noise is not None:
             drawn[:, at["torque_noise"]] = self._noise(first, count)
+            if self.row.noisy:
+                size, noise = (count, self.row.n), self.problem.noise
+                drawn[:, at["link_noise"]] = self.link.normal(0.0, noise.link_deviation, size=size)
+                drawn[:, at["motor_noise"]] = self.motor.normal(0.0, noise.motor_deviation, size=size)
         drawn[:, at["elapsed"]] = (self._elapsed(runs) * self.problem.period)[:, None]
         return drawn, np.column_stack([np.broadcast_to(delay, count), runs])
 

@@ -54,7 +54,7 @@ def setpoint_table(
     ScenarioError
         For rows that a file could not have either.
     """
-    t = _numbers("time", time)
+    t = numbers_of("time", time)
     if t.ndim != 1 or not t.size:
         raise SizeError("time", got=f"shape {t.shape}", needs="(N,)")
     names, columns = ["t"], [t[:, None]]
@@ -62,7 +62,7 @@ def setpoint_table(
     def add(name: str, given: ArrayLike | None, shapes: dict[tuple[int, ...], tuple[str, ...]]) -> None:
         if given is None:
             return
-        values = _numbers(name, given)
+        values = numbers_of(name, given)
         if values.shape[:1] != t.shape or values.shape[1:] not in shapes:
             needs = " or ".join(str((t.size, *shape)) for shape in shapes)
             raise SizeError(name, got=f"shape {values.shape}", needs=needs)
@@ -72,7 +72,7 @@ def setpoint_table(
     add("position", position, {(3,): POSITION})
     if isinstance(rotation, Rotation):
         rotation = rotation.as_quat()
-    elif rotation is not None and (R := _numbers("rotation", rotation)).ndim == 3 and R.shape[1:] == (3, 3):
+    elif rotation is not None and (R := numbers_of("rotation", rotation)).ndim == 3 and R.shape[1:] == (3, 3):
         rotation = _quaternions(R)
     add("rotation", rotation, {(3,): TURN, (4,): QUATERNION})
     add("velocity", velocity, {(3,): VELOCITY})
@@ -97,7 +97,8 @@ def setpoint_table(
         raise ScenarioError("table", told(error, data, Table)) from None
 
 
-def _numbers(name: str, given: Any) -> Array:
+def numbers_of(name: str, given: Any) -> Array:
+    """Return an array of numbers."""
     try:
         values = np.asarray(given, dtype=np.float64)
     except (TypeError, ValueError):

@@ -16,6 +16,7 @@ from passiflex.stability.linear_loop import LinearLoop
 from passiflex.stability.modes import self_motions
 from passiflex.stability.remedies import TOOL, remedies, without_compensation
 from passiflex.stability.remedy import Remedy
+from passiflex.stability.sooner_sensors import deciding
 from passiflex.stability.trial import Change, Trial
 
 SLOW = 0.5
@@ -93,6 +94,8 @@ def _reasons(t: Trial) -> Iterator[str]:
         yield "periods that are missed let a torque act for longer than this loop bears"
     if s.jitter and late > s.delay and t.stable(late=s.delay):
         yield "commands that the jitter makes later than the law knows"
+    for entry, late in deciding(s):
+        yield f"sensors that are late, by a {entry} of {1e3 * late:.3g} ms"
     if _is_self_motion(t):
         stiff = t.loop.parts.unpack("actions", t.loop.problem.numbers)["posture_stiffness"]
         yield (

@@ -7,13 +7,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from passiflex.scenarios.sensor_settings import DELAYS
 from passiflex.stability.clock_words import hertz
 from passiflex.stability.remedy import INSIDE, Remedy, tried
+from passiflex.stability.sooner_sensors import SHARES
 from passiflex.stability.trial import Trial
 
 FASTER = np.geomspace(1.25, 200, 16)
-SHARES = (0.75, 0.5, 0.25, 0.1, 0.0)
-"""Of a delay or of the periods that are missed."""
 
 
 def fewer_missed(t: Trial) -> Iterator[Remedy]:
@@ -33,14 +33,15 @@ def faster(t: Trial) -> Iterator[Remedy]:
     s = t.loop.problem
     rows = 1 / t.problem.output_interval  # of which the new rate is a multiple, so that the rows still fit
     rate = math.ceil(INSIDE * factor / s.period / rows - 1e-9) * rows
-    late, jitter = s.delay / s.period / rate, s.jitter / s.period / rate
-    what = " and ".join(name for name, value in (("delay", late), ("jitter", jitter)) if value)
-    words = f"a rate of {hertz(rate)}" + (f", with as many periods of {what}" if what else "")
-    entry = {"rate": rate, "delay": late, "jitter": jitter}
+    control = {"delay": s.delay / s.period / rate, "jitter": s.jitter / s.period / rate}
+    kinds = control | {"delay of the sensors": max(s.lateness)}
+    what = " and ".join(name for name, value in kinds.items() if value)
+    words = f"a rate of {hertz(rate)}" + f", with as many periods of {what}" * bool(what)
     if s.task_periods > 1:
-        entry["task_rate"] = rate / s.task_periods
-        words += f", and task_rate {hertz(rate / s.task_periods)}"
-    yield Remedy(words, {"control": entry})
+        control["task_rate"] = rate / s.task_periods
+        words += f", and task_rate {hertz(control['task_rate'])}"
+    sensors = {name: v / s.period / rate for name, v in zip(DELAYS, s.lateness, strict=True) if v}
+    yield Remedy(words, {"control": {"rate": rate, **control}} | ({"sensors": sensors} if sensors else {}))
 
 
 def faster_task(t: Trial) -> Iterator[Remedy]:

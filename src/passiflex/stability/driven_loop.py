@@ -45,7 +45,7 @@ def driven(loop: LinearLoop, delay: float | None = None, gains: Gains | None = N
     flow, of = loop.flow(timing), dict[bool, DrivenLoop]()
     for due in dict.fromkeys(loop.phases):
         ran = loop.runs(timing, gains, noise=True, due=due)
-        now, heard = ran[:, : len(flow)], ran[:, len(flow) :]
+        now, heard = ran[:, : len(flow)], ran[:, len(flow) : len(flow) + n]
         sent = slice(told, told + n)
         of[due] = DrivenLoop(flow @ now, flow @ heard, now[sent], heard[sent])
     return [of[due] for due in loop.phases]

@@ -31,12 +31,13 @@ IDEAL = {
     "coulomb_compensation": 0.0,
 }
 """What has no linear approximation is left out, and constants."""
+NOISE = ("torque_noise", "link_noise", "motor_noise")
 KEPT = 8
 """Derivatives that are remembered."""
 
 
 class LawSlope:
-    """The derivative of (memory, command) by (x, memory, noise of τ_a) of one period at rest.
+    """The derivative of (memory, command) by (x, memory, noise of τ_a; of q, θ if there is any) of one period at rest.
 
     By central differences on the compiled code, which are exact to 1e-8 here.
 
@@ -79,7 +80,8 @@ class LawSlope:
         return np.hstack([-K, K, -D, D, np.zeros((self.n, self.x.size - 4 * self.n))])
 
     def _differences(self, period: float, elapsed: float, gains: Gains, due: bool) -> Array:
-        control, told = self.compiled.control, self.compiled.loop.row.slices["torque_noise"]
+        control, row_layout = self.compiled.control, self.compiled.loop.row
+        told = row_layout.columns(lambda f: f.name in NOISE)
         own = self.parts["gains"].unpack(self.problem.gains) | {k: np.asarray(v) for k, v in gains.items()}
         memory, row, phi = self._at_rest(own, elapsed)
         if due and self.problem.controller.held_task:
@@ -98,7 +100,7 @@ class LawSlope:
             after, command, _ = control.map(points[:, :n_x], memories, rows, numbers)
             return np.hstack([after[:, self.remembered], command])
 
-        return slope(evaluate, np.concatenate([self.x, memory[self.remembered], np.zeros(self.n)]))
+        return slope(evaluate, np.concatenate([self.x, memory[self.remembered], np.zeros(told.size)]))
 
     def _at_rest(self, gains: Gains, elapsed: float) -> AtRest:
         """Return where the law rests, which is asked again and again for gains that change nothing there."""

@@ -195,7 +195,7 @@ class LinearLoop:
 
     def _heard(self, torque: Array, period: float, elapsed: float, gains: Gains, due: bool) -> Array:
         by_torque = (self._kin or self).law.by(period, elapsed, gains, due=due)[:, self._told :]
-        return np.asarray(by_torque @ torque)
+        return np.asarray(by_torque[:, : self.n] @ torque)
 
     @cached_property
     def _torque(self) -> Array:

@@ -93,6 +93,8 @@ def _certified(maps: Array, chances: Array) -> bool:
     )
     P = found.reshape(n, n) + found.reshape(n, n).T
     rest = left(P.ravel()).reshape(n, n)
+    if not (np.isfinite(P).all() and np.isfinite(rest).all()):
+        return False
     return bool(np.linalg.eigvalsh(P)[0] > 0 and np.linalg.eigvalsh(rest + rest.T)[0] > 0)
 
 

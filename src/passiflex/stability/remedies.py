@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from passiflex.problems.altered import rewritten, with_flange
 from passiflex.problems.problem import Problem, SampledProblem
 from passiflex.stability.clock_remedies import (
-    SHARES,
     faster,
     faster_task,
     fewer_missed,
@@ -21,6 +20,7 @@ from passiflex.stability.clock_remedies import (
 )
 from passiflex.stability.judgement import Judgement, holds
 from passiflex.stability.remedy import INSIDE, Remedy, tried
+from passiflex.stability.sooner_sensors import SHARES, sooner_sensors
 from passiflex.stability.trial import Change, Trial
 
 Array = NDArray[np.float64]
@@ -38,6 +38,7 @@ TOOL = 0.02
 def remedies(problem: Problem, found: Judgement) -> Iterator[Remedy]:
     """Yield what makes an unstable problem hold, the change of a number first; all were tried as a whole scenario."""
     trial = Trial(problem, found)
+    yield from (Remedy(*sooner) for sooner in sooner_sensors(trial.loop.problem))
     for look in LOST if found.missed else FAST:
         for remedy in look(trial):
             if _is_new(problem, remedy) and tried(problem, remedy):

@@ -9,10 +9,11 @@ import numpy as np
 from passiflex.metrics.numbers import rms
 from passiflex.metrics.steps import displacement
 from passiflex.passivity import audit
-from passiflex.scenarios.control_settings import Control, SensorSettings
+from passiflex.scenarios.control_settings import Control
+from passiflex.scenarios.forces import Force
 from passiflex.scenarios.gain_settings import ShapedInertia, ShapedStiffness
 from passiflex.scenarios.law_settings import ImpedanceSettings
-from passiflex.scenarios.scenario import Force
+from passiflex.scenarios.sensor_settings import SensorSettings
 from passiflex.simulation import Run, Scenario, resolve, simulate_problem
 from passiflex.studies.paper import Report, shipped_scenario
 from passiflex.studies.summary import plain

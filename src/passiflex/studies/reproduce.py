@@ -21,6 +21,7 @@ from passiflex.plotting.figures import CircleColumn, Series, StepColumn, draw_ci
 from passiflex.reports import write_report
 from passiflex.reports.viewer import read_viewer
 from passiflex.robots import FlexibleJointRobot
+from passiflex.scenarios.forces import Force
 from passiflex.scenarios.law_settings import ImpedanceSettings
 from passiflex.simulation import Scenario
 from passiflex.studies.contact import reproduce_contact
@@ -104,7 +105,11 @@ def conditions(scenario: Scenario) -> str:
 def _task(scenario: Scenario) -> str:
     """Return what reference and forces do, in words."""
     words = [said for e in scenario.reference if (said := e.in_full())]
-    words += [f"force {list(f.force)} N from {f.start:g} s to {f.end:g} s" for f in scenario.forces]
+    words += [
+        f"force {list(f.force)} N from {f.start:g} s to {f.end:g} s"
+        for f in scenario.forces
+        if isinstance(f, Force)
+    ]
     errors = {k.replace("_", " "): v for k, v in scenario.model_errors.model_dump().items() if v}
     if errors:
         words.append("law's model: " + ", ".join(f"{k} {v:+.0%}" for k, v in errors.items()))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar, cast, get_args
 from pydantic import BaseModel, ValidationError
 
 from passiflex.errors import ScenarioError
-from passiflex.texts.model_mistakes import fields, former_names, models, tag_field, told
+from passiflex.texts.model_mistakes import fields, former_names, models, tag_field, told, with_entries
 from passiflex.texts.yaml_tree import dotted
 
 if TYPE_CHECKING:  # a section is changed by this module
@@ -134,6 +134,8 @@ def _chosen(here: tuple[Model, ...], old: Any) -> Model | None:
         return None
     if len(here) < 2:
         return here[0] if here else None
+    if not any(map(tag_field, here)):
+        return next(iter(with_entries(here, old)), None)
     return next((m for m in here if (tag := tag_field(m)) and old.get(tag) == _word(m, tag)), None)
 
 

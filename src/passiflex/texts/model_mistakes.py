@@ -141,6 +141,11 @@ def tag_field(model: Model) -> str | None:
     return None
 
 
+def with_entries(found: Iterable[Model], written: dict[str, Any]) -> tuple[Model, ...]:
+    """Return the models that have all the entries that were written: where no entry chooses one, they do."""
+    return tuple(m for m in found if written.keys() <= fields(m).keys())
+
+
 def _tag(model: Model) -> str:
     name = tag_field(model)
     return str(typing.get_args(fields(model)[name].annotation)[0]) if name else ""
@@ -149,12 +154,13 @@ def _tag(model: Model) -> str:
 class _Reached(NamedTuple):
     """The models at a place: several where a union has not been decided; or the entries of a list or mapping.
 
-    `chosen` says that what follows is the name of a branch that a function chose.
+    `chosen` says that what follows is the name of a branch that a function chose; `branches`, that each entry has one.
     """
 
     models: tuple[Model, ...]
     entries: bool = False
     chosen: bool = False
+    branches: bool = False
 
 
 def _steps(loc: Place, root: Model) -> Iterator[tuple[bool, _Reached]]:
@@ -162,17 +168,27 @@ def _steps(loc: Place, root: Model) -> Iterator[tuple[bool, _Reached]]:
     here = _Reached((root,))
     for part in loc:
         in_file = not here.chosen and (here.entries or len(here.models) < 2)
-        if here.entries or here.chosen:
-            here = _Reached(here.models)
+        if here.entries:
+            here = _Reached(here.models, chosen=here.branches)
+        elif here.chosen:
+            named = tuple(m for m in here.models if m.__name__ == part)
+            here = _Reached(named or here.models)
         elif not in_file:
             here = _Reached(tuple(m for m in here.models if part == _tag(m)))
         else:
             field = {k: f for m in here.models for k, f in readable(m).items()}.get(str(part))
             annotation = field.annotation if field else None
-            chosen = field is not None and any(isinstance(m, Discriminator) for m in field.metadata)
-            several = typing.get_origin(annotation) in (tuple, dict)
-            here = _Reached(tuple(models(annotation)), several and not chosen, chosen)
+            chosen = field is not None and _has_branches(field.metadata)
+            several = typing.get_origin(annotation) in (tuple, dict) and not chosen
+            inner = typing.get_args(annotation)[:1] if several else ()
+            each = any(_has_branches(getattr(part, "__metadata__", ())) for part in inner)
+            here = _Reached(tuple(models(annotation)), several, chosen, each)
         yield in_file, here
+
+
+def _has_branches(metadata: Iterable[Any]) -> bool:
+    """Return whether a function chooses among the branches of a union."""
+    return any(isinstance(m, Discriminator) for m in metadata)
 
 
 def _in_file(loc: Place, data: Any, root: Model) -> Place:
