@@ -175,6 +175,8 @@ def test_what_the_tank_cannot_know_yet_is_said_before_the_run() -> None:
         "covers that up to 25 W"
     )
     assert book_cautions(resolve(world(**late(0, 3, 0, 3)))) == ()
+    (more,) = book_cautions(resolve(world(**late(2, 0, 4, 0), control={"missed": 0.1})))
+    assert more == f"{line}; with periods missed as well it may fall back for good though the loop is sound"
 
 
 @pytest.mark.slow

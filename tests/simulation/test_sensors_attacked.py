@@ -72,6 +72,24 @@ def late(rng: np.random.Generator) -> dict[str, Any]:
     return data
 
 
+def corner(rng: np.random.Generator) -> dict[str, Any]:
+    """Return a scenario with each of what noise on q and θ hangs on at one end of its range."""
+    data = noisy(rng, "planar2r")
+    stiffness, inertia = float(rng.choice([0.5, 4])), float(rng.choice([0.5, 2]))
+    data["law"] |= {"shaped_stiffness": {"ratio": stiffness}, "shaped_inertia": {"ratio": inertia}}
+    data["law"]["stiffness"] = {"translation": float(rng.choice([50, 800]))}
+    data["control"] |= {
+        "inner_loop": "plain",
+        "missed": 0.0,
+        "delay": float(rng.choice([0, 1]) / data["control"]["rate"]),
+    }
+    link, motor = rng.choice([0.0, 1e-4], 2)
+    data["noise"] = {"torque_variance": 0.0, "link_deviation": float(link), "motor_deviation": float(motor)}
+    data["sensors"] |= {"velocity_filter": float(rng.choice([50, np.inf])), "link_resolution": 0.0}
+    data["tank"]["initial"] = float(rng.choice([0.15, 3]))
+    return data
+
+
 def last_seen(run: Run, periods: float) -> np.ndarray:
     """Return ∫ τ_aᵀ q̇ at the instant that was read last, so many periods of the law late.
 
@@ -105,7 +123,7 @@ def attacked(data: dict[str, Any]) -> Attacked:
 
 ALWAYS = "the tank sees what goes through the joints"
 """How the caution begins that sensors which are late have whatever happens: it excuses nothing."""
-CASES = {"noisy": noisy, "late": late}
+CASES = {"noisy": noisy, "corner": corner, "late": late}
 
 
 def attack(kind: str, runs: int, seed: int) -> list[tuple[int, dict[str, Any], Any]]:

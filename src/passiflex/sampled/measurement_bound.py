@@ -56,12 +56,14 @@ class Bound(NamedTuple):
     Attributes
     ----------
     total: E, which is subtracted from a level before anything is granted.
+    lasting: E without what is guessed of the time since the instant that was read last: that guess comes and goes.
     lowered: By how much the declared errors of the sensors alone may have lowered a level since it last was
         sure. What readings hide between them, and what noise credits, lowers no level.
     state: The fields of `bound_state`, by name, but for those of `sure_state`.
     """
 
     total: cs.SX
+    lasting: cs.SX
     lowered: cs.SX
     state: dict[str, Any]
 
@@ -174,7 +176,7 @@ def booked_bound(
     lowered += passing  # where S was read before what it gave or took
     if readings.noisy:
         lowered += r.debited_energy - s.sure_debited_energy
-    return Bound(total, lowered, {"measurement_bound": total} | state)
+    return Bound(total, total - passing / least, lowered, {"measurement_bound": total} | state)
 
 
 def sure(now: cs.SX, q: cs.SX, s: Any, state: dict[str, Any]) -> dict[str, Any]:

@@ -111,5 +111,5 @@ def period_after(
         "faults": s.faults + cs.fmin(tank.fault, 1),
         "lost_time": 0,
         **known,
-        **sure(is_sure, r.paired.q, s, known),
+        **sure(is_sure, r.paired.q, s, known | {"measurement_bound": r.bound.lasting}),
     }
