@@ -15,6 +15,7 @@ from passiflex.passivity import audit
 from passiflex.plotting.polishing import Polished, draw_polishing
 from passiflex.scenarios.reference import Circle
 from passiflex.simulation import Run, Scenario, resolve, simulate_problem
+from passiflex.studies.contact import ENDLESS
 from passiflex.studies.gliding import (
     DOME,
     FLOOR,
@@ -37,8 +38,6 @@ FORCES, FRICTIONS = (5.0, 10.0, 20.0), (0.2, 0.4, 0.6)
 """Wanted press [N] and friction of the dome."""
 INWARD = np.array([0, math.sin(LEAN), -math.cos(LEAN)])
 """From where the hand starts to the dome's middle."""
-ENDLESS = 1000.0
-"""So much in the tank [J] never ends: the law without one."""
 UNDER_WAY, LEFT_BEHIND = 1.0, 5e-3
 """Time on the circle [s] after which the hand is taken to glide, and distance [m] to the reference in force from which
 on it is held back."""
