@@ -24,6 +24,7 @@ from passiflex.robots import FlexibleJointRobot
 from passiflex.scenarios.law_settings import ImpedanceSettings
 from passiflex.simulation import Scenario
 from passiflex.studies.contact import reproduce_contact
+from passiflex.studies.grip import reproduce_grip
 from passiflex.studies.paper import FIGURES, Case, Report, figure_cases
 from passiflex.studies.polishing import reproduce_polishing
 from passiflex.studies.sampled import reproduce_sampled
@@ -33,6 +34,7 @@ from passiflex.studies.written import Written
 
 STUDIES: dict[str, Callable[[Path, Report], Written]] = {
     "contact": reproduce_contact,
+    "grip": reproduce_grip,
     "polishing": reproduce_polishing,
     "sampled": reproduce_sampled,
     "uncertainty": reproduce_uncertainty,
@@ -50,7 +52,8 @@ def reproduce(
     """Run the given figures, and return what was written into `folder`, by figure.
 
     The paper's three if none is given; `sampled` is the study of the sampled world, `uncertainty` that of a
-    thousand robots, `contact` that of hands that come to walls, `polishing` that of friction and the tank.
+    thousand robots, `contact` that of hands that come to walls, `polishing` that of friction and the tank, `grip`
+    that of a load that the law does not know.
 
     Each figure gives a PNG, a PDF, its runs as netCDF and a page to look at one of them; all give their part
     of `summary.json`, which keeps what earlier calls wrote about other figures of the same version.
