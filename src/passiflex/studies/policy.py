@@ -105,6 +105,7 @@ def told(wish: str, tank: float, seed: int) -> Scenario:
             "tank.initial": tank,
             "reference": [wishes(wish, seed).model_dump(exclude_none=True)],
             "seed": seed,
+            "output_interval": 0.002,
             "duration": DURATION,
         }
     )

@@ -25,6 +25,7 @@ from passiflex.scenarios.law_settings import ImpedanceSettings
 from passiflex.simulation import Scenario
 from passiflex.studies.contact import reproduce_contact
 from passiflex.studies.grip import reproduce_grip
+from passiflex.studies.hands import reproduce_hands
 from passiflex.studies.paper import FIGURES, Case, Report, figure_cases
 from passiflex.studies.policy import reproduce_policy
 from passiflex.studies.polishing import reproduce_polishing
@@ -36,6 +37,7 @@ from passiflex.studies.written import Written
 STUDIES: dict[str, Callable[[Path, Report], Written]] = {
     "contact": reproduce_contact,
     "grip": reproduce_grip,
+    "hands": reproduce_hands,
     "policy": reproduce_policy,
     "polishing": reproduce_polishing,
     "sampled": reproduce_sampled,
@@ -55,7 +57,8 @@ def reproduce(
 
     The paper's three if none is given; `sampled` is the study of the sampled world, `uncertainty` that of a
     thousand robots, `contact` that of hands that come to walls, `polishing` that of friction and the tank, `grip`
-    that of a load that the law does not know, `policy` that of set-points and stiffness at 15 Hz.
+    that of a load that the law does not know, `policy` that of set-points and stiffness at 15 Hz,
+    `hands` that of forces that a hand may be pressed with.
 
     Each figure gives a PNG, a PDF, its runs as netCDF and a page to look at one of them; all give their part
     of `summary.json`, which keeps what earlier calls wrote about other figures of the same version.
