@@ -32,6 +32,7 @@ from passiflex.studies.polishing import reproduce_polishing
 from passiflex.studies.sampled import reproduce_sampled
 from passiflex.studies.summary import summarise
 from passiflex.studies.uncertainty import reproduce_uncertainty
+from passiflex.studies.walls import reproduce_walls
 from passiflex.studies.written import Written
 
 STUDIES: dict[str, Callable[[Path, Report], Written]] = {
@@ -42,6 +43,7 @@ STUDIES: dict[str, Callable[[Path, Report], Written]] = {
     "polishing": reproduce_polishing,
     "sampled": reproduce_sampled,
     "uncertainty": reproduce_uncertainty,
+    "walls": reproduce_walls,
 }
 """Studies beyond the paper's figures: each writes its figure and pages into a folder, and returns its numbers."""
 TITLES = {
@@ -58,7 +60,8 @@ def reproduce(
     The paper's three if none is given; `sampled` is the study of the sampled world, `uncertainty` that of a
     thousand robots, `contact` that of hands that come to walls, `polishing` that of friction and the tank, `grip`
     that of a load that the law does not know, `policy` that of set-points and stiffness at 15 Hz,
-    `hands` that of forces that a hand may be pressed with.
+    `hands` that of forces that a hand may be pressed with,
+    `walls` a campaign over walls.
 
     Each figure gives a PNG, a PDF, its runs as netCDF and a page to look at one of them; all give their part
     of `summary.json`, which keeps what earlier calls wrote about other figures of the same version.
