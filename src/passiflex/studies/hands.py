@@ -71,7 +71,7 @@ def attack(name: str, wall: float, energy: float) -> Scenario:
         "description": f"{name}, with {energy:.3g} J above the tank's floor",
         "environment[0].stiffness": wall,
         "tank.initial": FLOOR + energy,
-        "duration": 2.5,
+        "duration": 4.0,
     }
     return shipped_scenario("contact").changed(changes | ATTACKS[name])
 
