@@ -17,6 +17,7 @@ def ran(way: str) -> tuple[Run, Grip]:
     return run, gripped(run, read_mass(run))
 
 
+@pytest.mark.slow
 def test_a_load_sags_by_its_weight_over_the_springs_and_its_lift_is_paid_by_the_tank() -> None:
     run, found = ran(UNKNOWN)
     assert found.verdict == "passive"

@@ -26,6 +26,7 @@ def test_a_policy_goes_as_far_as_it_says_and_switches_its_stiffness(wish: str) -
     assert set(np.unique(rows.stiffness[:, 0, 0])) == {SOFT[0], STIFF[0]}
 
 
+@pytest.mark.slow
 def test_a_tank_bounds_what_a_policy_gives_and_how_hard_it_presses() -> None:
     guarded, free = obeyed(ran(WILD, 1.0, 0)), obeyed(ran(WILD, ENDLESS, 0))
     assert guarded.verdict == "passive"

@@ -54,6 +54,7 @@ def test_a_hand_that_hardly_glides_presses_as_wanted() -> None:
     assert closed.power == pytest.approx(1e-9 * closed.force * SPEED, rel=0.05)
 
 
+@pytest.mark.slow
 def test_friction_empties_the_tank_as_foreseen_and_the_hand_stays_pressed() -> None:
     """At the shortest run of the study; the tank pays for the way, and the spring for the press."""
     run = simulate(polishing(20, 0.6))
