@@ -87,6 +87,17 @@ def contact(folder: Path) -> None:
     reproduce_contact(folder, engines=ENGINES[:1])
 
 
+def study(name: str) -> Group:
+    """Return the group of a study that leaves one figure, one report and one table, all under its name."""
+
+    def make(folder: Path) -> None:
+        from passiflex.studies.reproduce import STUDIES
+
+        STUDIES[name](folder, lambda text: None)
+
+    return Group((f"{name}.png", f"{name}.html", f"{name}.md"), make)
+
+
 def uncertainty(folder: Path) -> None:
     """Make the figure of the study `uncertainty`, of fewer robots than the study has."""
     from passiflex.studies.uncertainty import reproduce_uncertainty
@@ -169,6 +180,7 @@ GROUPS = (
     ),
     Group(("limits.png",), limits),
     Group(("contact.png", "contact.html"), contact),
+    *(study(name) for name in ("polishing", "grip", "policy", "hands", "walls")),
     Group(("uncertainty.png",), uncertainty),
     Group(("cards.md", *(f"card_{name}.html" for name, _ in commanded())), cards),
 )

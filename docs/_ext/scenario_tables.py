@@ -81,8 +81,13 @@ def default(field: FieldInfo) -> str:
     if isinstance(value, float):
         return "inf" if math.isinf(value) else f"{value:g}"
     if isinstance(value, tuple):
-        return f"[{', '.join(f'{v:g}' for v in value)}]"
+        return listed(value)
     return {"": "empty", None: "–", True: "true", False: "false"}.get(value, str(value))
+
+
+def listed(values: tuple[Any, ...]) -> str:
+    """Return a list, or a list of lists, as it would be written."""
+    return f"[{', '.join(listed(v) if isinstance(v, tuple) else f'{v:g}' for v in values)}]"
 
 
 def _is_section(part: Any) -> bool:

@@ -33,7 +33,7 @@ from passiflex.campaigns.evaluate import (
     run_sample,
 )
 from passiflex.errors import NameUnknownError, ValueRangeError
-from passiflex.metrics.measures import MEASURES, measures
+from passiflex.metrics.measures import MEASURES, OF_CONTACT, measures
 from passiflex.metrics.steps import step_window
 from passiflex.simulation import resolve
 from worlds import merged
@@ -59,6 +59,15 @@ CAMPAIGNS: dict[str, Campaign] = {
 }
 
 
+UNTOUCHED = tuple(name for name in MEASURES if name not in OF_CONTACT)
+WALL: dict[str, Any] = {
+    "forces": [{"from": 0.1, "to": 0.6, "force": [4, 0, 0]}],
+    "environment": [
+        {"kind": "plane", "point": [0.002, 0, 0], "normal": [-1, 0, 0], "relative": True, "stiffness": 1e3}
+    ],
+}
+
+
 def rows(of: Campaign, samples: Any = None) -> list[dict[str, Any]]:
     return evaluate_samples(of.to_yaml(), range(of.samples) if samples is None else samples)
 
@@ -80,7 +89,7 @@ def test_a_row_has_the_draws(name: str) -> None:
     table = draws(c, range(c.samples))
     for row, drawn in zip(rows(c), table, strict=True):
         assert [row[column] for column in columns(c)] == drawn.tolist()
-        assert list(row) == ["sample", *columns(c), *TEXTS, *MEASURES]
+        assert list(row) == ["sample", *columns(c), *TEXTS, *UNTOUCHED]
 
 
 def test_words_are_words() -> None:
@@ -131,7 +140,7 @@ def test_a_sample_that_no_scenario_can_be_is_refused_and_disturbs_no_other() -> 
         assert list(row) == list(found[good[0]])
         assert "60 periods" in row["failure"]
         assert row["decided_by"] == ""
-        assert all(math.isnan(row[name]) for name in MEASURES)
+        assert all(math.isnan(row[name]) for name in UNTOUCHED)
         assert len(row["displacement_x"]) == len(found[good[0]]["displacement_x"])
         assert np.isnan(row["displacement_z"]).all()
 
@@ -183,7 +192,31 @@ def test_only_the_metrics_that_are_kept(name: str) -> None:
 
 
 def test_all_metrics_are_kept_if_none_is_named() -> None:
-    assert kept_measures(campaign()) == tuple(MEASURES)
+    """Those of contact where there is a surface to touch."""
+    assert kept_measures(campaign()) == UNTOUCHED
+    assert kept_measures(campaign(merged(SAMPLED, WALL))) == tuple(MEASURES)
+
+
+def test_the_place_and_the_stiffness_of_a_wall_are_drawn_and_what_it_felt_is_kept() -> None:
+    """By a run of the sample alone, to the last bit."""
+    drawn = {
+        "environment.1.stiffness": {"distribution": "log_uniform", "low": 1e2, "high": 1e4},
+        "environment.1.point.1": uniform(0.001, 0.004),
+    }
+    c = campaign(merged(SAMPLED, WALL), parameters=drawn)
+    found = rows(c)
+    assert any(row["contact_force_peak"] > 0.1 for row in found)
+    for i, row in enumerate(found):
+        (wall,) = sample_scenario(c, i).environment
+        assert wall.stiffness == row["environment.1.stiffness"]  # type: ignore[union-attr]
+        assert wall.point[0] == row["environment.1.point.1"]  # type: ignore[union-attr]
+        force = np.linalg.norm(run_sample(c, i)["plane_force"], axis=1)
+        assert row["contact_force_peak"] == force.max()
+
+
+def test_a_measure_of_contact_that_is_asked_for_without_a_surface_is_missing() -> None:
+    (row, *_) = rows(campaign(keep={"metrics": ["margin", "contact_energy"]}))
+    assert math.isnan(row["contact_energy"])
 
 
 @pytest.mark.parametrize("keep", [{"metrics": ["margin", "torque_pek"]}, {"by": "torque_pek", "worst": 1}])

@@ -230,7 +230,8 @@ def test_an_unknown_figure_names_the_nearest(shell: Shell, tmp_path: Path) -> No
     assert result.status == 2
     assert result.err.startswith(
         "passiflex: unknown figure; got 'figg1'; "
-        "needs one of contact, fig1, fig2, fig3, sampled, uncertainty; try 'fig1'"
+        "needs one of contact, fig1, fig2, fig3, grip, hands, policy, polishing, sampled, uncertainty, walls; "
+        "try 'fig1'"
     )
     assert len(result.err.splitlines()) == 1
     assert not (tmp_path / "new").exists()

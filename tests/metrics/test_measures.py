@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 from functools import lru_cache
 from pathlib import Path
@@ -13,7 +14,8 @@ import pytest
 
 import passiflex
 from passiflex.metrics import measures as module
-from passiflex.metrics.measures import MEASURES, SIGNALS, measures
+from passiflex.metrics.contact import contact_signals
+from passiflex.metrics.measures import MEASURES, OF_CONTACT, SIGNALS, measures
 from passiflex.metrics.msd import ideal_response
 from passiflex.metrics.steps import step_window
 from passiflex.problems.problem import Event, SampledProblem
@@ -70,6 +72,29 @@ WORLDS: dict[str, dict[str, Any]] = {
         "forces": [],
         "duration": 4,
     },
+    "wall": {
+        **SAMPLED,
+        "environment": [
+            {
+                "kind": "plane",
+                "point": [0, 0, 0.02],
+                "normal": [0, 0, -1],
+                "relative": True,
+                "stiffness": 2000,
+            },
+            {
+                "kind": "plane",
+                "name": "far",
+                "point": [0, 0, 0.03],
+                "normal": [0, 0, -1],
+                "relative": True,
+                "stiffness": 5e3,
+            },
+        ],
+        "forces": [],
+        "output_interval": 0.005,
+    },
+    "load": {**SAMPLED, "environment": [{"kind": "load", "from": 1.5, "to": 2, "mass": 0.1}], "forces": []},
     "continuous": {
         **SAMPLED,
         "control": None,
@@ -103,14 +128,15 @@ def numbers(name: str) -> dict[str, float]:
 
 @pytest.mark.parametrize("name", WORLDS)
 def test_there_is_every_measure_and_no_other(name: str) -> None:
-    assert set(found(name)) == set(MEASURES) | TEXTS
+    touched = set(OF_CONTACT) if name == "wall" else set()
+    assert set(found(name)) == set(MEASURES) - set(OF_CONTACT) | touched | TEXTS
     assert all(type(value) is float for value in numbers(name).values())
     assert all(type(found(name)[text]) is str for text in TEXTS)
 
 
 def test_the_table_is_complete() -> None:
     for name, measure in MEASURES.items():
-        assert measure.unit in {"1", "J", "s", "m", "rad", "N m"}, name
+        assert measure.unit in {"1", "J", "s", "m", "rad", "N m", "N", "N s"}, name
         assert measure.worst in {"low", "high"}
         assert measure.meaning
 
@@ -222,6 +248,28 @@ def test_the_response_to_the_step(name: str) -> None:
     assert got["rms_to_msd"] > 1e-3
 
 
+def test_what_surfaces_felt() -> None:
+    """Row by row, of two walls behind each other."""
+    run, got = run_of("wall"), found("wall")
+    felt = [[math.hypot(*force) for force in run[f"{name}_force"]] for name in ("plane", "far")]
+    assert got["contact_force_peak"] == pytest.approx(max(map(max, felt)), rel=1e-12)
+    assert got["contact_force_peak"] > 0.5
+    middles = [(a + b) / 2 for force in felt for a, b in itertools.pairwise(force)]
+    assert got["contact_impulse"] == pytest.approx(sum(middles) * 0.005, rel=1e-9)
+    given = [-(a + b) for a, b in zip(run["plane_given_energy"], run["far_given_energy"], strict=True)]
+    assert got["contact_energy"] == pytest.approx(max(given), rel=1e-12)
+    ends = [a > 0.1 >= b for force in felt for a, b in itertools.pairwise(force)]
+    assert got["contact_bounces"] == sum(ends)
+
+
+@pytest.mark.parametrize("name", ["wall", "load"])
+def test_a_hand_that_something_touches_is_held_against_no_ideal(name: str) -> None:
+    """The ideal knows of neither; without them it is there."""
+    assert math.isnan(found(name)["rms_to_msd"])
+    assert math.isfinite(found(name)["overshoot"])
+    assert math.isfinite(found("sampled")["rms_to_msd"])
+
+
 def test_without_a_step_there_is_no_response() -> None:
     missing = {name for name, value in numbers("no step").items() if math.isnan(value)}
     assert missing == {"overshoot", "settling_time", "offset_before_step", "rms_to_msd", "fell_back_at"}
@@ -250,9 +298,10 @@ def test_a_run_that_leaves_the_finite_numbers(name: str) -> None:
 
 @pytest.mark.parametrize("name", [n for n in WORLDS if n != "continuous"])
 def test_a_recording_in_lanes_has_the_measures_of_its_run(name: str) -> None:
-    """To the last bit: `SIGNALS` are all that is needed."""
+    """To the last bit: `SIGNALS` and those of surfaces are all that is needed."""
     problem = resolve(scenario(name))
-    (got,) = digest_batch([problem], SIGNALS, lambda _, r: measures(problem, step_window(scenario(name)), r))
+    signals = (*SIGNALS, *contact_signals(problem))
+    (got,) = digest_batch([problem], signals, lambda _, r: measures(problem, step_window(scenario(name)), r))
     assert got.keys() == found(name).keys()
     for key, value in found(name).items():
         assert got[key] == value or (math.isnan(value) and math.isnan(got[key])), key

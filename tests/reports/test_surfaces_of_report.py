@@ -55,6 +55,36 @@ def test_force_and_depth_are_rows_of_the_run_and_the_rest_is_another_force() -> 
     assert frames["moment"] is None
 
 
+def test_the_mark_is_where_the_hand_touches() -> None:
+    """On the face of the body that is drawn, or nearest to it on the hand's sphere; also of one that moves."""
+    run = touching()
+    assert run.scenario is not None
+    read, hand = page(run), run.scenario.hand
+    for surface in read.header["surfaces"]:
+        point, depth = read.array(surface["point"]), read.array(surface["depth"]).ravel()
+        rows = np.searchsorted(run.time, read.array(read.header["frames"]["time"]))
+        place = np.array(surface["body"]["place"]) + (
+            0 if surface["shift"] is None else read.array(surface["shift"])
+        )
+        local = (point - place) @ np.reshape(surface["body"]["rotation"], (3, 3))
+        match surface["body"]["kind"]:
+            case "plane":
+                outside = local[:, 2]
+            case "sphere":
+                outside = np.linalg.norm(local, axis=1) - surface["body"]["sizes"][0]
+            case "cylinder":
+                outside = np.linalg.norm(local[:, :2], axis=1) - surface["body"]["sizes"][0]
+            case _:
+                outside = np.maximum(-depth, 0)
+        np.testing.assert_allclose(outside, np.maximum(-depth, 0), atol=2e-5)
+        centres = run["position"][rows][:, None] + np.einsum(
+            "nij,pj->npi", run["rotation"][rows], np.array(hand.points)
+        )
+        away = np.linalg.norm(point[:, None] - centres, axis=2)
+        held = hand.radius - np.maximum(depth, 0)
+        assert (np.abs(away - held[:, None]) < 2e-5).any(axis=1).all()
+
+
 def test_a_run_without_surfaces_has_none() -> None:
     assert page(sampled()).header["surfaces"] == []
 

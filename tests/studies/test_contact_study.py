@@ -40,6 +40,13 @@ def test_gains_by_recommend_press_and_rest_where_the_papers_hammer() -> None:
     assert paper.given > 50 * ours.given
 
 
+def test_the_law_of_public_controllers_has_no_tank_that_could_hold_it_back() -> None:
+    """A scenario that names no tank has one, which held it back at 0.5 m/s."""
+    run = simulate(approach("public", 1e4, 0.5))
+    assert run["governed_time"][-1] == 0
+    assert felt(run).peak == pytest.approx(153, abs=1)
+
+
 def test_what_a_wall_felt_is_read_from_its_force() -> None:
     run = simulate(approach("recommended", 1e3, 0.5))
     numbers = felt(run)

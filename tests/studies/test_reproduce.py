@@ -142,7 +142,8 @@ def test_a_figure_that_the_paper_does_not_have(tmp_path: Path) -> None:
     with pytest.raises(NameUnknownError) as error:
         reproduce(["fig9"], tmp_path / "new")
     assert str(error.value).startswith(
-        "unknown figure; got 'fig9'; needs one of contact, fig1, fig2, fig3, sampled, uncertainty; try 'fig"
+        "unknown figure; got 'fig9'; needs one of contact, fig1, fig2, fig3, grip, hands, policy, polishing, sampled, "
+        "uncertainty, walls; try 'fig"
     )
     assert not (tmp_path / "new").exists()
 

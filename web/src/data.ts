@@ -37,6 +37,8 @@ export interface Surface {
   shift: Table | null;
   force: Table;
   depth: Table;
+  /** Where the hand touches it [m]; null where that is not known. */
+  point: Table | null;
 }
 
 /** The motion on one time grid: angles [rad] (prismatic: m), positions [m], force [N], moment [N m]. */
@@ -121,7 +123,7 @@ export function opened(header: Header, blob: ArrayBuffer): Report {
       moment: maybe(frames.moment),
     },
     ghosts: header.ghosts.map((ghost) => ({ ...ghost, q: maybe(ghost.q), position: table(ghost.position) })),
-    surfaces: header.surfaces.map((surface) => ({ ...surface, shift: maybe(surface.shift), force: table(surface.force), depth: table(surface.depth) })),
+    surfaces: header.surfaces.map((surface) => ({ ...surface, shift: maybe(surface.shift), force: table(surface.force), depth: table(surface.depth), point: maybe(surface.point) })),
     panels: header.panels.map((panel) => ({
       ...panel,
       curves: panel.curves.map((curve) => ({ ...curve, x: times[curve.time]!, y: unshuffled(blob, curve.values) })),

@@ -49,6 +49,8 @@ export interface Touch {
   pressed: boolean;
   /** How far it has moved [m]; null for one that stays. */
   shift: number[] | null;
+  /** Where the hand touches it [m]; null where that is not known. */
+  point: number[] | null;
 }
 
 /** A surface at a place of the run. */
@@ -60,6 +62,7 @@ export function touchAt(surface: Surface, place: Place): Touch {
     force,
     pressed: valuesAt(surface.depth, held)[0]! > 0 && force.every(Number.isFinite),
     shift: surface.shift && valuesAt(surface.shift, place),
+    point: surface.point && valuesAt(surface.point, place),
   };
 }
 

@@ -92,6 +92,8 @@ export interface SurfaceRef {
   shift: ArrayRef | null;
   force: ArrayRef;
   depth: ArrayRef;
+  /** Where the hand touches it; null or missing where that is not known. */
+  point?: ArrayRef | null;
 }
 
 export interface CurveRef {

@@ -27,10 +27,12 @@ from passiflex.errors import (
     ValueRangeError,
 )
 from passiflex.files import as_path
-from passiflex.metrics.measures import MEASURES, SIGNALS, measures
+from passiflex.metrics.contact import contact_signals
+from passiflex.metrics.measures import MEASURES, OF_CONTACT, SIGNALS, measures
 from passiflex.metrics.steps import displacement, step_window
 from passiflex.passivity.ledger import Signals
 from passiflex.problems.problem import Problem, SampledProblem
+from passiflex.scenarios.surface_settings import AbstractSurface
 from passiflex.simulation import Run, Scenario, resolve, simulate_problem
 from passiflex.simulation.batch import digest_batch, simulate_in_lane
 
@@ -75,7 +77,7 @@ def evaluate_samples(text: str, samples: Sequence[int]) -> list[dict[str, Any]]:
     def row(k: int, run: Signals) -> dict[str, Any]:
         _, scenario, problem = ready[k]
         measured = measures(problem, step_window(scenario), run)
-        return {name: measured[name] for name in kept} | _kept_response(campaign, run)
+        return {name: measured.get(name, math.nan) for name in kept} | _kept_response(campaign, run)
 
     def measured(which: Sequence[int]) -> list[dict[str, Any]]:
         return _digested([ready[k][2] for k in which], lambda k, run: row(which[k], run))
@@ -110,8 +112,9 @@ def _one(run: Callable[[Sequence[int]], list[dict[str, Any]]], k: int) -> dict[s
 
 
 def kept_measures(campaign: Campaign) -> tuple[str, ...]:
-    """Return the names of the measures that a campaign keeps."""
-    return campaign.keep.metrics or tuple(MEASURES)
+    """Return the names of the measures that a campaign keeps; those of contact unasked where there are surfaces."""
+    surfaces = any(isinstance(entry, AbstractSurface) for entry in campaign.scenario.environment)
+    return campaign.keep.metrics or tuple(name for name in MEASURES if surfaces or name not in OF_CONTACT)
 
 
 def require_response(campaign: Campaign) -> None:
@@ -165,7 +168,7 @@ def _digested(problems: Sequence[Problem], digest: Digest, *, threads: int = 1) 
             sampled,
             digest_batch(
                 [problems[k] for k in sampled],
-                SIGNALS,
+                (*SIGNALS, *(contact_signals(problems[sampled[0]]) if sampled else ())),
                 lambda k, run: digest(sampled[k], run),
                 threads=threads,
             ),

@@ -12,6 +12,7 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from passiflex.campaigns.campaign import Campaign
+from passiflex.campaigns.distributions import LogUniform
 from passiflex.campaigns.evaluate import REFUSED
 from passiflex.campaigns.importance import Association, Index
 from passiflex.campaigns.intervals import Share
@@ -24,10 +25,9 @@ from passiflex.simulation import resolve
 
 Array = NDArray[np.float64]
 
-DISTRIBUTIONS = ("margin", "overshoot", "settling_time", "torque_share")
-"""Metrics whose distributions are drawn, of those that were kept."""
-AGAINST = "margin"
-"""The metric that the most important parameter is drawn against."""
+DISTRIBUTIONS = ("margin", "contact_force_peak", "overshoot", "settling_time", "torque_share")
+"""Metrics whose distributions are drawn, of those that were kept; those of a step only where there is one."""
+OF_STEP = ("overshoot", "settling_time")
 MOST_METRICS, MOST_COLUMNS = 3, 14
 """Of the bars: metrics beside each other, and parameters below each other."""
 BESIDE = 0.25
@@ -71,7 +71,10 @@ class Bars(NamedTuple):
 
 
 class Scatter(NamedTuple):
-    """A metric against one column; of words x is the index, and the points of a word lie beside each other."""
+    """A metric against one column; of words x is the index, and the points of a word lie beside each other.
+
+    What is drawn evenly in its logarithm is `logarithmic`.
+    """
 
     parameter: str
     words: tuple[str, ...]
@@ -79,6 +82,7 @@ class Scatter(NamedTuple):
     metric: str
     y: Array
     verdicts: NDArray[np.str_]
+    logarithmic: bool = False
 
 
 class Page(NamedTuple):
@@ -112,14 +116,16 @@ def page(
     blocks: Of the verdicts and responses, which are wide, if the rows come without them.
     """
     run = np.array([v != REFUSED for v in rows["verdict"].to_pylist()] if rows.num_rows else [], dtype=bool)
-    chance = 1 - found.level
+    chance, stepped = 1 - found.level, step_window(campaign.scenario) is not None
     columns, bars = _bars(campaign, found, chance)
     return Page(
         title=f"{campaign.name}: {found.samples} samples",
         conditions=found.conditions,
         shares=found.shares,
         distributions=tuple(
-            _ecdf(name, numbers_of(rows, name)[run]) for name in DISTRIBUTIONS if name in rows.column_names
+            _ecdf(name, numbers_of(rows, name)[run])
+            for name in DISTRIBUTIONS
+            if name in rows.column_names and (stepped or name not in OF_STEP)
         ),
         band=_band(campaign, [rows] if blocks is None else blocks),
         columns=columns,
@@ -130,9 +136,12 @@ def page(
 
 
 def ideal_along(campaign: Campaign) -> tuple[Array, Array] | None:
-    """Return time [s] and displacement [m] along the step of the ideal mass-spring-damper; None without a step."""
+    """Return time [s] and displacement [m] along the step of the ideal mass-spring-damper.
+
+    None without a step, and where something touches the robot.
+    """
     scenario, window = campaign.scenario, step_window(campaign.scenario)
-    if window is None:
+    if window is None or scenario.environment:
         return None
     problem = resolve(scenario)
     gains = problem.law.layout.unpack(problem.gains)
@@ -218,7 +227,8 @@ def _root(index: Index | None) -> float:
 
 
 def _scatter(campaign: Campaign, rows: pa.Table, run: NDArray[np.bool_], found: Statistics) -> Scatter | None:
-    of = [a for a in found.associations if a.metric == AGAINST and math.isfinite(a.strength)]
+    """Return the metric by which samples are the worst against what it hangs on most."""
+    of = [a for a in found.associations if a.metric == found.by and math.isfinite(a.strength)]
     if not of:
         return None
     best = max(of, key=lambda a: a.weight)
@@ -229,9 +239,10 @@ def _scatter(campaign: Campaign, rows: pa.Table, run: NDArray[np.bool_], found: 
         label(campaign, best.parameter, best.joint) + unit,
         column.words,
         column.values[run] + (_beside(int(run.sum())) if column.words else 0.0),
-        AGAINST,
-        numbers_of(rows, AGAINST)[run],
+        found.by,
+        numbers_of(rows, found.by)[run],
         np.array(rows["verdict"].to_pylist())[run],
+        isinstance(campaign.parameters[best.parameter], LogUniform),
     )
 
 

@@ -26,7 +26,9 @@ Array = NDArray[np.float64]
 
 PROBABILITIES = (0.05, 0.25, 0.5, 0.75, 0.95)
 VERDICTS = ("passive", "violated", "inconclusive")
-OF_INTEREST = ("margin", "overshoot", "settling_time", "torque_share", "rms_to_msd", "tank_energy_min")
+OF_INTEREST = (
+    "margin", "contact_force_peak", "overshoot", "settling_time", "torque_share", "rms_to_msd", "tank_energy_min",
+)  # fmt: skip
 """Metrics for which it is asked what they hang on, unless the caller names others."""
 
 

@@ -31,7 +31,7 @@ def reproduce(
 ) -> int:
     """Reproduce the paper's figures, fig1, fig2, fig3 (all if none is named), or a study.
 
-    The studies are contact, sampled and uncertainty.
+    The studies are contact, grip, hands, policy, polishing, walls (all on touch), sampled and uncertainty.
 
     Writes per figure a PNG, a PDF and the runs as netCDF, and one summary.json. With --sensitivity, one
     figure that shows how the conclusions move with what the paper does not print.

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from passiflex.control.gain_design import target_inertia
 from passiflex.metrics.closed_form import ideal_displacement
+from passiflex.metrics.contact import contact_numbers, surfaces_of
 from passiflex.metrics.numbers import rms
 from passiflex.metrics.steps import StepWindow, displacement, step_numbers
 from passiflex.passivity import Audit, audit
@@ -60,14 +61,24 @@ MEASURES = {
     "torque_share": Measure("1", "high", "the same as a share of the joint's limit"),
     "velocity_share": Measure("1", "high", "largest link velocity as a share of the joint's limit"),
     "joint_limit_margin": Measure("rad", "low", "least distance to the end of a joint's range"),
+    "contact_force_peak": Measure("N", "high", "largest force of a surface on the hand"),
+    "contact_impulse": Measure("N s", "high", "force of the surfaces over time, whatever its direction"),
+    "contact_energy": Measure("J", "high", "most energy that the surfaces had had from the hand"),
+    "contact_bounces": Measure("1", "high", "how often the hand left a surface"),
     "tracking_rms": Measure("m", "high", "distance of the end effector from x_d"),
     "overshoot": Measure("1", "high", "beyond the step, as a share of it"),
     "settling_time": Measure("s", "high", "until the response stays within 2 % of the step"),
     "offset_before_step": Measure("m", "high", "motion along the step before it, without its sign"),
-    "rms_to_msd": Measure("1", "high", "distance to the ideal mass-spring-damper, as a share of the step"),
+    "rms_to_msd": Measure(
+        "1",
+        "high",
+        "distance to the ideal mass-spring-damper, as a share of the step; of a hand that nothing touches",
+    ),
     "end_time": Measure("s", "low", "simulated time; shorter than the duration if the run ended early"),
 }
 """What can be kept and asked for, by name."""
+OF_CONTACT = tuple(name for name in MEASURES if name.startswith("contact_"))
+"""Those of a scenario with surfaces."""
 
 
 def with_unit(measure: str) -> str:
@@ -85,13 +96,13 @@ SIGNALS = (
     "carried_energy", "compensated_energy", "shaped_kinetic_energy", "shaped_spring_energy", "cartesian_spring_energy",
     "gravity_storage", "governed_time", "latched", "read_time", "measurement_bound",
 )  # fmt: skip
-"""What is recorded of a sampled run for it."""
+"""What is recorded of a sampled run for it, beside `contact_signals`."""
 
 
 def measures(
     problem: Problem, window: StepWindow | None, run: Signals, audited: Audit | None = None
 ) -> dict[str, float | str]:
-    """Return verdict, what decided it, why the run failed, and the numbers of `MEASURES`.
+    """Return verdict, what decided it, why the run failed, and the numbers of `MEASURES`; of contact with surfaces.
 
     `audited` is the run's audit, if it has been made already.
     """
@@ -121,6 +132,7 @@ def measures(
         "torque_share": (torque / robot.torque_limit).max(),
         "velocity_share": (speed / robot.velocity_limit).max(),
         "joint_limit_margin": min((lowest - low).min(), (high - highest).min()),
+        **contact_numbers(surfaces_of(problem), run),
         "tracking_rms": rms(np.linalg.norm(run["position"] - run["desired_position"], axis=1)),
         **_response(problem, window, run),
         "end_time": end,
@@ -156,7 +168,8 @@ def _response(problem: Problem, window: StepWindow | None, run: Signals) -> dict
     numbers = step_numbers(run.time, moved, _ideal(problem, len(run.time)), window)
     numbers["offset_before_step"] = abs(numbers["offset_before_step"])
     changing = isinstance(problem, SampledProblem) and problem.gain_changes
-    return numbers | ({"rms_to_msd": math.nan} if changing else {})
+    touched = any(e.acts and e.books.outside for e in problem.elements)  # which the ideal knows nothing of
+    return numbers | ({"rms_to_msd": math.nan} if changing or touched else {})
 
 
 MOST_IDEALS = 64

@@ -155,7 +155,7 @@ def _meaning(chance: float) -> str:
 
 def _scatter(axes: Axes, scatter: Scatter | None) -> None:
     if scatter is None:
-        _nothing(axes, "nothing to draw against the margin")
+        _nothing(axes, "nothing that varies to draw")
         return
     for verdict, style in VERDICTS.items():
         chosen = scatter.verdicts == verdict
@@ -167,6 +167,8 @@ def _scatter(axes: Axes, scatter: Scatter | None) -> None:
     if scatter.words:
         axes.set_xticks(range(len(scatter.words)), scatter.words)
         axes.set_xlim(-0.6, len(scatter.words) - 0.4)
+    if scatter.logarithmic:
+        axes.set_xscale("log")
     axes.set_xlabel(_with_unit(scatter))
     axes.set_ylabel(_measured(scatter.metric))
     axes.set_title("the most important parameter")

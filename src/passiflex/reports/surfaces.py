@@ -11,6 +11,7 @@ from passiflex.diagrams import surface_role, touched
 from passiflex.diagrams.viewed import first_finite
 from passiflex.reports.arrays import Arrays
 from passiflex.reports.thinning import frame_rows
+from passiflex.reports.touching_point import touching_point
 from passiflex.scenarios.environment import labelled
 from passiflex.scenarios.surface_settings import AbstractSurface, Box, Cylinder, Plane, Sphere
 from passiflex.simulation import Run
@@ -40,12 +41,13 @@ def surfaces_header(run: Run, arrays: Arrays) -> list[dict[str, Any]]:
         entry = known.get(name)
         body = _body(entry, start) if isinstance(entry, AbstractSurface) else None
         moved = f"{name}_place"
-        shift = None
+        shift, shift_of = None, None
         if isinstance(entry, AbstractSurface) and entry.motion:
             there = run.data.get(moved)
             known_there = there is not None and there.shape == (run.time.size, 3)
             place = run[moved][rows] if known_there else np.full((rows.size, 3), np.nan)
-            shift = arrays.add(place - _place(entry, start))
+            shift_of = place - _place(entry, start)
+            shift = arrays.add(shift_of)
         found.append(
             {
                 "name": name,
@@ -54,9 +56,32 @@ def surfaces_header(run: Run, arrays: Arrays) -> list[dict[str, Any]]:
                 "shift": shift,
                 "force": arrays.add(run[f"{name}_force"][rows]),
                 "depth": arrays.add(run[f"{name}_depth"][rows]),
+                "point": None if body is None else _point(run, entry, start, rows, shift_of, arrays),
             }
         )
     return found
+
+
+def _point(
+    run: Run, entry: Any, start: Array, rows: NDArray[np.intp], shift: Array | None, arrays: Arrays
+) -> Any:
+    """Return where the hand touches at the rows; None where its pose is not known."""
+    turned = run.data.get("rotation")
+    if (
+        run.scenario is None
+        or "position" not in run.data
+        or turned is None
+        or turned.shape != (run.time.size, 3, 3)
+    ):
+        return None
+    place = _place(entry, start) + (np.zeros(3) if shift is None else shift)
+    with np.errstate(all="ignore"):
+        where = np.broadcast_to(place, (rows.size, 3))
+        return arrays.add(
+            touching_point(
+                entry, entry.axes, run.scenario.hand, where, run["position"][rows], run["rotation"][rows]
+            )
+        )
 
 
 def surface_notices(surfaces: list[dict[str, Any]], run: Run) -> list[str]:

@@ -38,6 +38,8 @@ TOUCHES = 0.1
 """Force [N] from which on the hand is on the wall."""
 CRITICAL: dict[str, Any] = {"translation": 2 * 500**0.5, "rotation": 2 * 30**0.5}
 """2√K, as public controllers have it, whatever the inertia."""
+ENDLESS = 1000.0
+"""So much in the tank [J] never ends: the law without one, as a scenario that names no tank has one of 2 J."""
 PUBLIC: dict[str, Any] = {"inner_loop": "plain", "allow_unstable": True}
 
 
@@ -63,7 +65,7 @@ LAWS = {
     ),
     "public": Way(
         "Jᵀ(K e − D ẋ), D = 2√K",
-        {"law.shaped_inertia": {"ratio": 1}, "law.damping": CRITICAL, "tank": None}
+        {"law.shaped_inertia": {"ratio": 1}, "law.damping": CRITICAL, "tank.initial": ENDLESS}
         | {f"control.{name}": value for name, value in PUBLIC.items()},
     ),
     "paper": Way(

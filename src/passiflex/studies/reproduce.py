@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -25,13 +25,28 @@ from passiflex.scenarios.forces import Force
 from passiflex.scenarios.law_settings import ImpedanceSettings
 from passiflex.simulation import Scenario
 from passiflex.studies.contact import reproduce_contact
+from passiflex.studies.grip import reproduce_grip
+from passiflex.studies.hands import reproduce_hands
 from passiflex.studies.paper import FIGURES, Case, Report, figure_cases
+from passiflex.studies.policy import reproduce_policy
+from passiflex.studies.polishing import reproduce_polishing
 from passiflex.studies.sampled import reproduce_sampled
 from passiflex.studies.summary import summarise
 from passiflex.studies.uncertainty import reproduce_uncertainty
+from passiflex.studies.walls import reproduce_walls
+from passiflex.studies.written import Written
 
-STUDIES = {"contact": reproduce_contact, "sampled": reproduce_sampled, "uncertainty": reproduce_uncertainty}
-"""Studies beyond the paper's figures."""
+STUDIES: dict[str, Callable[[Path, Report], Written]] = {
+    "contact": reproduce_contact,
+    "grip": reproduce_grip,
+    "hands": reproduce_hands,
+    "policy": reproduce_policy,
+    "polishing": reproduce_polishing,
+    "sampled": reproduce_sampled,
+    "uncertainty": reproduce_uncertainty,
+    "walls": reproduce_walls,
+}
+"""Studies beyond the paper's figures: each writes its figure and pages into a folder, and returns its numbers."""
 TITLES = {
     "robot": "gravity: the robot's own compensation\n(as in the paper)",
     "static": "gravity in plant and law\n(static compensation by the law's model)",
@@ -44,7 +59,10 @@ def reproduce(
     """Run the given figures, and return what was written into `folder`, by figure.
 
     The paper's three if none is given; `sampled` is the study of the sampled world, `uncertainty` that of a
-    thousand robots, `contact` that of hands that come to walls.
+    thousand robots, `contact` that of hands that come to walls, `polishing` that of friction and the tank, `grip`
+    that of a load that the law does not know, `policy` that of set-points and stiffness at 15 Hz,
+    `hands` that of forces that a hand may be pressed with,
+    `walls` a campaign over walls.
 
     Each figure gives a PNG, a PDF, its runs as netCDF and a page to look at one of them; all give their part
     of `summary.json`, which keeps what earlier calls wrote about other figures of the same version.

@@ -1,4 +1,4 @@
-/** What touches the hand: translucent bodies, a mark on the hand while it is in one, and the force as an arrow. */
+/** What touches the hand: translucent bodies, a mark where the hand touches one, and the force as an arrow. */
 
 import { BoxGeometry, type BufferGeometry, Color, CylinderGeometry, DoubleSide, EdgesGeometry, Group, LineBasicMaterial, LineSegments, Mesh, MeshLambertMaterial, PlaneGeometry, SphereGeometry } from "three";
 import type { Surface } from "../data.ts";
@@ -98,8 +98,9 @@ export class SurfaceView {
       if (shift && this.#body.visible) this.#body.position.set(shift[0]!, shift[1]!, shift[2]!);
     }
     const size = Math.hypot(...force);
-    const felt = this.arrow.move(tip, force, pressed && this.#largest > 0 ? size / this.#largest : 0);
-    this.mark.object.visible = this.mark.move(tip) && pressed;
+    const at = touch.point ?? tip;
+    const felt = this.arrow.move(at, force, pressed && this.#largest > 0 ? size / this.#largest : 0);
+    this.mark.object.visible = this.mark.move(at) && pressed;
     this.tag.shown = felt && this.#seen;
     this.tag.element.textContent = `${this.#surface.name} ${shown(size, 3)} N`;
   }
