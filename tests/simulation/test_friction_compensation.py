@@ -19,53 +19,68 @@ FRICTION: dict[str, Any] = {"coulomb_friction": 3, "viscous_friction": 5, "frict
 EQUAL: dict[str, Any] = {"coulomb_compensation": 3, "viscous_compensation": 5, "compensation_width": 0.05}
 
 
-def sticking(compensated: float, **changes: Any) -> Run:
+def sticking(compensated: float, width: float = 0.02, **changes: Any) -> Run:
     """Return a run with 2 N m of friction that sticks, and this much made up for."""
     motors = {"coulomb_friction": 2, "friction": "sticks"}
-    actions = {"coulomb_compensation": compensated, "compensation_width": 0.02}
-    return ran(duration=2.0, motors=motors, actions=actions, **changes)
+    actions = {"coulomb_compensation": compensated, "compensation_width": width}
+    return ran(**{"duration": 2.0, "motors": motors, "actions": actions} | changes)
 
 
-def test_what_it_gives_is_what_friction_of_that_size_takes() -> None:
+def off(run: Run) -> float:
+    return float(np.linalg.norm((run["position"] - run["desired_position"])[-1]))
+
+
+def test_what_it_gives_is_less_than_friction_of_that_size_takes() -> None:
     numbers = action_layout(2).symbols("a")[1]
     dtheta = cs.SX.sym("dtheta", 2)
     given = friction_compensation(dtheta, numbers)
     names = ("coulomb_compensation", "viscous_compensation", "compensation_width")
     f = cs.Function("f", [dtheta, *(getattr(numbers, n) for n in names)], [given])
-    speeds = np.array([0.3, -0.02])
-    torque = np.asarray(f(speeds, [3, 1], [5, 0], 0.05)).ravel()
-    np.testing.assert_allclose(torque, [3 * np.tanh(6) + 1.5, -np.tanh(0.4)], rtol=1e-14)
+    for speed in np.geomspace(1e-4, 10, 30):
+        torque = np.asarray(f([speed, -speed], [3, 1], [5, 0], 0.05)).ravel()
+        assert 0 < torque[0] - 5 * speed < 3 * np.tanh(speed / 0.05)
+        assert -np.tanh(speed / 0.05) < torque[1] < 0
+    fast = np.asarray(f([5, -5], [3, 1], [5, 0], 0.05)).ravel()
+    np.testing.assert_allclose(fast, [28, -1], rtol=1e-3)
+    slope = cs.Function("s", f.sx_in(), [cs.jacobian(f(*f.sx_in()), f.sx_in()[0])])
+    np.testing.assert_allclose(np.asarray(slope([0, 0], [3, 1], [5, 0], 0.05)), np.diag([5, 0]), atol=1e-12)
 
 
 @pytest.mark.parametrize("inner", ["plain", "matched"])
-def test_a_motor_moves_as_if_it_had_no_friction(inner: str) -> None:
+def test_a_motor_moves_as_if_it_had_no_viscous_friction(inner: str) -> None:
     """Up to the hold: it is half a period late, so that the difference halves with the period."""
-    off = []
+    apart = []
     for rate in (1000, 2000):
         how: dict[str, Any] = {
             "control": {"rate": rate, "inner_loop": inner, "external_torque": "none"},
             "law": {"shaped_inertia": {"ratio": 0.5}},
             "output_interval": 0.005,
         }
-        free, rough = ran(**how), ran(**how, motors=FRICTION)
-        run = ran(**how, motors=FRICTION, actions=EQUAL)
-        off.append(np.abs(run["q"] - free["q"]).max())
-        assert off[-1] < 0.02 * np.abs(rough["q"] - free["q"]).max()
+        rubbing = {"viscous_friction": 5}
+        free, rough = ran(**how), ran(**how, motors=rubbing)
+        run = ran(**how, motors=rubbing, actions={"viscous_compensation": 5})
+        apart.append(np.abs(run["q"] - free["q"]).max())
+        assert apart[-1] < 0.02 * np.abs(rough["q"] - free["q"]).max()
         assert np.ptp(books(run)) < 1e-12
-    assert off[1] == pytest.approx(off[0] / 2, rel=0.15)
+    assert apart[1] == pytest.approx(apart[0] / 2, rel=0.15)
 
 
-def test_its_power_is_that_of_the_friction() -> None:
-    run = ran(motors=FRICTION, actions=EQUAL, output_interval=0.001)
+def test_with_dry_friction_too_it_lags_by_little() -> None:
+    free, rough, run = ran(), ran(motors=FRICTION), ran(motors=FRICTION, actions=EQUAL)
+    assert np.abs(run["q"] - free["q"]).max() < 0.25 * np.abs(rough["q"] - free["q"]).max()
     given = np.sum(run["compensation_power"][:-1]) * 1e-3
-    assert given == pytest.approx(run["friction_energy"][-1], rel=0.01)
+    assert 0.8 * run["friction_energy"][-1] < given < run["friction_energy"][-1]
 
 
-def test_it_leaves_a_third_of_the_steady_error_of_friction_that_sticks() -> None:
-    """None of it while nothing moves: c tanh(θ̇/w) has no part at rest."""
-    errors = [np.linalg.norm((r["position"] - r["desired_position"])[-1]) for r in (sticking(0), sticking(2))]
+def test_on_friction_that_sticks_it_comes_to_rest_with_a_fraction_of_the_error() -> None:
+    """And does not tremble: made up for too steeply, the motor that gives way within its friction would."""
+    errors = []
+    for compensated in (0, 1.6):
+        run = sticking(compensated, width=0.05, duration=4.0)
+        assert np.abs(run["dq"][-500:]).max() < 1e-6
+        errors.append(off(run))
     assert errors[0] > 0.01
-    assert errors[1] < errors[0] / 3
+    assert errors[1] < errors[0] / 4
 
 
 @pytest.mark.parametrize("damping", [5, 40])
@@ -85,12 +100,18 @@ def test_too_much_of_it_never_rests_and_a_tank_throttles_it(compensated: float, 
 
 
 def test_more_than_the_motors_have_is_said_before_a_run() -> None:
-    motors = {"coulomb_friction": [2, 4]}
-    told = cautions(resolve(world(motors=motors, actions={"coulomb_compensation": 3})))
-    assert told == (
-        "actions make up for 3 N m of dry friction at joint 1, which has 2 N m: what is too much keeps it moving",
-    )
-    assert cautions(resolve(world(motors=motors, actions={"coulomb_compensation": [2, 4]}))) == ()
+    """By height, or because it comes at lower speeds than theirs."""
+
+    def told(motors: dict[str, Any], actions: dict[str, Any]) -> tuple[str, ...]:
+        return cautions(resolve(world(motors=motors, actions=actions)))
+
+    (line,) = told({"coulomb_friction": [2, 4]}, {"coulomb_compensation": 3})
+    assert line.startswith("actions make up for more dry friction than joint 1 has, by 1 N m at")
+    assert told({"coulomb_friction": [2, 4]}, {"coulomb_compensation": [2, 4]}) == ()
+    (line,) = told(FRICTION, EQUAL | {"compensation_width": 0.01})
+    assert line.startswith("actions make up for more dry friction than joint 1 has")
+    (line,) = told({"coulomb_friction": 3, "friction": "sticks"}, {"coulomb_compensation": 2.5})
+    assert line.startswith("friction of joint 1 sticks, and making up for it takes away up to 32 N m s/rad")
 
 
 def test_viscous_friction_that_is_not_there_is_refused_with_a_share_that_holds() -> None:

@@ -44,7 +44,7 @@ def action_layout(n: int) -> Layout:
             Field("follow_acceleration", (), "1", "share of Λ ẍ_d that is fed forward"),
             Field("coulomb_compensation", (n,), "N m", "dry friction that is made up for"),
             Field("viscous_compensation", (n,), "N m s/rad", "viscous friction that is made up for"),
-            Field("compensation_width", (), "rad/s", "speed over which the first changes its sign"),
+            Field("compensation_width", (), "rad/s", "speed at which half of the first is made up for"),
         ),
         ActionNumbers,
     )
@@ -101,11 +101,12 @@ def tracking_wrench(
 
 
 def friction_compensation(dtheta: cs.SX, a: ActionNumbers) -> cs.SX:
-    """Return c tanh(θ̇/w) + v θ̇ [N m], on the motors: what friction of that size takes, if they move.
+    """Return c θ̇|θ̇| / (θ̇² + w²) + v θ̇ [N m], on the motors: what friction of that size takes, if they move.
 
-    It gives power, always. Where friction takes less, what is left makes the motor move on by itself.
+    It gives power, always. Where friction takes less, what is left makes the motor move on by itself. At rest the
+    first part has no slope: one as of c tanh(θ̇/w) would be a negative damping of c/w on a motor that sticks.
     """
-    dry = a.coulomb_compensation * cs.tanh(dtheta / a.compensation_width)
+    dry = a.coulomb_compensation * dtheta * cs.fabs(dtheta) / (dtheta**2 + a.compensation_width**2)
     return dry + a.viscous_compensation * dtheta
 
 

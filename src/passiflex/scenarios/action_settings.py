@@ -35,7 +35,8 @@ class Actions(Section):
         default=0.0, description="viscous friction that is made up for, one number or one each, N m s/rad"
     )
     compensation_width: Annotated[float, Quantity("rad/s", above=0)] = Field(
-        default=0.01, description="speed over which the former changes its sign, rad/s"
+        default=0.05,
+        description="speed at which half of the dry friction is made up for, rad/s; at rest none of it is",
     )
 
     @property
