@@ -185,7 +185,10 @@ def test_the_valve_shuts_in_the_period_that_empties_the_tank(make: Callable[[], 
     np.testing.assert_array_equal(out.command[1], rig.law_says(told[1], p).command)
     torque = np.array(rig.actions(told[0], p)).ravel()
     speed = rig.told.unpack(told[0])["dtheta"]
-    against = ON["coulomb_compensation"] * speed * np.abs(speed) / (1 + speed**2) + ON["viscous_compensation"] * speed
+    against = (
+        ON["coulomb_compensation"] * speed * np.abs(speed) / (1 + speed**2)
+        + ON["viscous_compensation"] * speed
+    )
     expected = rig.law_says(told[0], p, torque).command + against
     np.testing.assert_allclose(out.command[0], expected, rtol=1e-14, atol=1e-13)
 

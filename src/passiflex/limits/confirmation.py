@@ -14,6 +14,7 @@ from passiflex.control.motion import hold
 from passiflex.control.tank import NO_CAP
 from passiflex.problems.altered import altered
 from passiflex.problems.problem import Event, Noise, Problem, SampledProblem, require_sampled
+from passiflex.sampled.readings import Lateness
 from passiflex.simulation.simulate_sampled import simulate_unchecked
 from passiflex.stability.law_slope import IDEAL
 from passiflex.stability.linear_loop import LinearLoop
@@ -77,9 +78,13 @@ def confirm(
     gains: Mapping[str, Array] | None = None,
     rate: float | None = None,
 ) -> Confirmation:
-    """Return both verdicts on the problem with these gains, at a rate with as many periods of delay."""
-    late = None if rate is None else problem.delay / problem.period / rate
-    changed = altered(problem, rate=rate, delay=late, gains=gains)
+    """Return both verdicts on the problem with these gains, at a rate with as many periods of delay, of sensors too."""
+    if rate is None:
+        changed = altered(problem, gains=gains)
+    else:
+        stretch = 1 / (problem.period * rate)
+        lateness = Lateness(*(late * stretch for late in problem.lateness)) if any(problem.lateness) else None
+        changed = altered(problem, rate=rate, delay=problem.delay * stretch, gains=gains, lateness=lateness)
     return Confirmation(plane, *point, LinearLoop(changed).radius(), growth(disturbed(changed)))
 
 
@@ -94,6 +99,7 @@ def disturbed(problem: Problem, periods: int = PERIODS) -> SampledProblem:
         s.with_numbers(IDEAL | endless),
         jitter=0.0,
         missed=0.0,
+        lost=(),
         allow_unstable=True,
         gain_changes=(),
         feedforward=(),

@@ -229,8 +229,8 @@ class InertiaSearch:
         """Return the member that holds with no B_e in words, and what it does."""
         member, heavy = self.failed[0], self.gains(np.full(self.robot.n, MOST))
         loop, late = self.box.loop(member)
-        values = lasting(loop.matrix(None, late, heavy), loop.problem.period, loop.task_jacobian)
-        slow = values[~trembles(values, loop.problem.period)]
+        values = lasting(loop.matrix(None, late, heavy), loop.cycle(), loop.task_jacobian)
+        slow = values[~trembles(values, loop.cycle())]
         falls = np.abs(slow).max(initial=0.0) >= 1
         what = (
             "a slow motion falls away, as K_x is soft for the weight that is off" if falls else "it trembles"

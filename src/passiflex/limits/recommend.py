@@ -13,7 +13,7 @@ import yaml
 from numpy.typing import ArrayLike, NDArray
 
 from passiflex.control.task import AbstractTask, PoseTask, PositionTask
-from passiflex.errors import NameUnknownError, SizeError, ValueRangeError
+from passiflex.errors import NameUnknownError, ScenarioError, SizeError, ValueRangeError
 from passiflex.limits.attempt import Attempt, Report
 from passiflex.limits.inertia_search import FLOORS, MOST, HeavierError, InertiaSearch, UnattainableError
 from passiflex.limits.one_thread import on_one_thread
@@ -134,17 +134,25 @@ def recommend_gains(
         )
     found: dict[str, Recommendation] = {}
     failures: dict[str, UnattainableError] = {}
-    tried = {
-        inner: Attempt(scenario, robot, places, torque_noise, inner, report)
-        for inner in (ORDER if inner_loop is None else (inner_loop,))
-    }
+    tried, others = dict[str, Attempt](), dict[str, str]()
+    for inner in ORDER if inner_loop is None else (inner_loop,):
+        try:
+            tried[inner] = Attempt(scenario, robot, places, torque_noise, inner, report)
+        except ScenarioError as unfit:  # with this clock it is no choice
+            if inner_loop is not None:
+                raise
+            others[inner] = f"is none here: {unfit.mistakes[0].partition(': ')[2]}"
+            mistaken = unfit
+    if not tried:
+        raise mistaken
     begun: dict[str, InertiaSearch] = {}
     for inner, attempt in tried.items():
         try:
             begun[inner] = attempt.begun(margin)
         except UnattainableError as failure:
             failures[inner] = failure
-    below, others = math.inf, {k: f"holds with no B_e: {v.got}" for k, v in failures.items()}
+    below = math.inf
+    others |= {k: f"holds with no B_e: {v.got}" for k, v in failures.items()}
     for inner in sorted(begun, key=lambda k: begun[k].mean):  # the lighter one is likely to stay so
         try:
             found[inner] = tried[inner].finished(begun[inner], below)

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from passiflex.metrics.numbers import overshoot, rms, settling_time
+from passiflex.scenarios.forces import Acting
 from passiflex.scenarios.reference import AbstractReferenceEvent, Step
 from passiflex.scenarios.scenario import Scenario
 from passiflex.scenarios.setpoints import Table
 
 Array = NDArray[np.float64]
+
+FEWEST = 10
+"""Rows in which a response is to be seen."""
 
 
 class StepWindow(NamedTuple):
@@ -25,18 +30,37 @@ class StepWindow(NamedTuple):
 
 
 def step_window(scenario: Scenario) -> StepWindow | None:
-    """Return the first step of a scenario until the next event of any kind; None if it has none that moves."""
+    """Return the first step of a scenario until the next event of any kind.
+
+    None if it has none that moves, or none that is left alone for `FEWEST` rows.
+    """
     step = next((e for e in scenario.reference if isinstance(e, Step) and any(e.by)), None)
     if step is None:
         return None
     times = [t for e in scenario.reference for t in _instants(e, scenario)]
     times += [t for c in scenario.gain_changes for t in (c.at, c.at + c.duration)]
-    times += [t for f in scenario.forces for acting in f.acting(scenario.duration) for t in acting[:2]]
+    times += [t for f in scenario.forces for t in _changes(f.acting(scenario.duration))]
     times += [t for entry in scenario.feedforward for t in (entry.start, entry.end)]
     times += [t for entry in scenario.environment for t in entry.lasts]
     size = float(np.linalg.norm(step.by))
     end = min([t for t in times if t > step.at] + [scenario.duration])
+    if end - step.at < FEWEST * scenario.output_interval:
+        return None
     return StepWindow(size, np.array(step.by) / size, step.at, end)
+
+
+def _changes(acting: Iterable[Acting]) -> list[float]:
+    """Return when a wrench changes [s], of rows one after the other that may say the same."""
+    found, none = list[float](), (0.0,) * 6
+    before, until = tuple[float, ...](none), 0.0
+    for start, end, wrench in acting:
+        held = tuple(wrench)
+        if start > until and any(before):
+            found.append(until)
+        if held != (before if start <= until else none):
+            found.append(start)
+        before, until = held, end
+    return [*found, until] if any(before) else found
 
 
 def _instants(event: AbstractReferenceEvent, scenario: Scenario) -> list[float]:

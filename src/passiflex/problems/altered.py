@@ -43,6 +43,7 @@ def altered(
     delay: float | None = None,
     gains: Mapping[str, ArrayLike] | None = None,
     plant: Mapping[str, ArrayLike] | None = None,
+    lateness: Lateness | None = None,
 ) -> SampledProblem:
     """Return the sampled problem with what is given in place of its own; what is left out stays.
 
@@ -54,6 +55,7 @@ def altered(
     rate, delay: [Hz], [s].
     gains: Of `law.layout`, by name; those of `GAINS`.
     plant: Of `robot.layout`, by name. The law's model stays as it is.
+    lateness: Of the sensors [s].
 
     Raises
     ------
@@ -77,10 +79,13 @@ def altered(
         _write_timing(data, period, late, rate)
     if gains is not None:
         _write_gains(data["law"], own)
+    if lateness is not None:
+        data["sensors"] = _late(data.get("sensors"), lateness)
     if plant is not None:
         data["robot"] = f"{law.robot.name}, changed in memory"
     kept = data["control"].get("fallback", {})
-    lag, noisy = s.lateness.in_periods(period), s.controller.readings.noisy
+    late_by = s.lateness if lateness is None else lateness
+    lag, noisy = late_by.in_periods(period), s.controller.readings.noisy
     require_soon(lag)
     fallback = {k: v for k, v in new.items() if k not in kept and not _is_shaping(k)}
     changed = dataclasses.replace(
@@ -94,6 +99,7 @@ def altered(
         ),
         period=period,
         delay=late,
+        lateness=late_by,
     )
     if {"stiffness", "damping"} & new.keys():  # in world axes, in place of what the law has in tool axes
         later = tuple(c for c in s.gain_changes if c.start > FROM_THE_START)
@@ -190,7 +196,7 @@ def later_sensors(problem: SampledProblem, lateness: Lateness) -> SampledProblem
     lag, controller = lateness.in_periods(problem.period), problem.controller
     require_soon(lag)
     data = read_back(problem.text)
-    data["sensors"] = dict(data.get("sensors") or {}) | dict(zip(DELAYS, map(float, lateness), strict=True))
+    data["sensors"] = _late(data.get("sensors"), lateness)
     readings = Readings.of(lag, noisy=controller.readings.noisy)
     changed = dataclasses.replace(
         problem,
@@ -199,6 +205,11 @@ def later_sensors(problem: SampledProblem, lateness: Lateness) -> SampledProblem
         controller=dataclasses.replace(controller, readings=readings),
     )
     return changed.with_numbers(late_errors(lag), "errors").with_numbers(late_sensors(lag), "sensors")
+
+
+def _late(sensors: Mapping[str, Any] | None, lateness: Lateness) -> dict[str, Any]:
+    """Return the entries of the sensors, so late [s]."""
+    return dict(sensors or {}) | dict(zip(DELAYS, map(float, lateness), strict=True))
 
 
 def _is_shaping(name: str) -> bool:

@@ -105,6 +105,9 @@ def _control(scenario: Scenario) -> str:
         return "continuous time"
     late = f"commands {_seconds(control.delay)} late" if control.delay else "no delay"
     parts = [_hertz(control.rate), late]
+    parts += (
+        [f"the task at {_hertz(control.task_rate)}"] if control.task_rate and control.task_periods > 1 else []
+    )
     parts += [f"jitter up to {_seconds(control.jitter)}"] if control.jitter else []
     parts += [f"{control.missed:.3g} of the periods missed"] if control.missed else []
     parts += [f"{sum(b.periods for b in control.lost)} lost in bursts"] if control.lost else []

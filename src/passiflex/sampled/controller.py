@@ -241,8 +241,10 @@ class SampledController:
             torque += valve * gated_torque(self.law, r.y, f.now, setpoint, granted, g, p)
         if self.compensates:
             against = valve * friction_compensation(r.y.dtheta, p.actions)
+        braked = torque
         if self.tank:
-            torque -= self.tank.braking(level, cs.dot(f.now.dphi, f.now.dphi), r.elapsed, p.tank) * f.now.dphi
+            damping = self.tank.braking(level, cs.dot(f.now.dphi, f.now.dphi), r.elapsed, p.tank)
+            braked = torque - damping * f.now.dphi
         reference, memory = Reference(granted.pose, setpoint.velocity), self.inner.state(self.law.robot.n)
 
         def commanded(added: cs.SX) -> Command:
@@ -250,13 +252,16 @@ class SampledController:
                 self.law, r.y, reference, p.model, g, added, memory.view(r.seen), p.inner
             )
 
-        command, kept = commanded(torque), {"compensation": against}
-        if self.held_task is not None:
+        kept = {"compensation": against}
+        if self.held_task is None:
+            command = commanded(braked)
+        else:
+            command = commanded(torque)  # a tank brakes in every period
             due = self.held_task.due(r.first, r.elapsed, s, p.inner)
             runs = cs.logic_or(due.now, f.latched > s.latched)
             held = cs.if_else(runs, command.tau_u, s.task_torque)
             kept |= {"task_torque": held, "task_age": due.age}
-            command = commanded(torque + held - command.tau_u)
+            command = commanded(braked + held - command.tau_u)
         command = command._replace(tau_m=command.tau_m + against)
         layout = self._of_the_command
         memory = layout.stack({field.name: kept[field.name] for field in layout})

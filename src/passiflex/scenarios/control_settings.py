@@ -76,8 +76,8 @@ class Control(Section):
     )
     delay: Instant = Field(
         default=0.0,
-        description="from a sample to the arrival of its command, s; the matched inner loop predicts over "
-        "whole periods",
+        description="from a sample to the arrival of its command, s; at most 60 periods; 20 with the matched inner "
+        "loop, which predicts over whole ones",
     )
     jitter: Instant = Field(
         default=0.0, description="each command is late by up to this much more, uniformly, s"

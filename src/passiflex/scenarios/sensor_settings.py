@@ -54,7 +54,7 @@ class SensorSettings(Section):
     )
     link_delay: Instant = Field(
         default=0.0,
-        description="q and q̇ are read this much late, s; between two samples, linearly",
+        description="q and q̇ are read this much late, s; between two samples, linearly; at most 20 periods",
     )
     motor_delay: Instant = Field(default=0.0, description="the same of θ and θ̇, s")
     torque_delay: Instant = Field(default=0.0, description="the same of τ_a, s")

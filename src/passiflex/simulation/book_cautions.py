@@ -71,7 +71,7 @@ def _late(problem: SampledProblem) -> tuple[str, ...]:
         f"the tank sees what goes through the joints {late * 1e3:.3g} ms late, and until then can but guess it: its "
         f"floor of {floor:g} J covers that up to {floor / late:.3g} W"
         + "; with periods missed as well it may fall back for good though the loop is sound"
-        * bool(problem.missed),
+        * bool(problem.missed or problem.lost),
     )
 
 

@@ -45,6 +45,7 @@ class Admissible(NamedTuple):
     most_stiffness: Largest stable K_e/K with the problem's B_e; 0 if there is none.
     least_inertia_unshaped: Smallest stable B_e/B with K_e = K; inf if there is none.
     from_rate: Rate from which the problem's gains are stable, with as many periods of delay [Hz]; inf if none.
+    as_many: What goes along with that rate, in words.
     """
 
     judgement: Judgement
@@ -57,6 +58,7 @@ class Admissible(NamedTuple):
     most_stiffness: float
     least_inertia_unshaped: float
     from_rate: float
+    as_many: str = ""
 
     @property
     def stable(self) -> bool:
@@ -108,7 +110,7 @@ class Admissible(NamedTuple):
             words.append(f"your gains are stable from {hertz(self.from_rate)} on")
         else:
             words.append(f"your gains are stable at no rate up to {hertz(RATES[1])}")
-        return " ".join(words) + (" with as many periods of delay" if self.delay > 0 else "")
+        return " ".join([*words, self.as_many]).rstrip()
 
 
 def check(problem: Problem, rate: float | None = None, delay: float | None = None) -> Admissible:
@@ -137,7 +139,18 @@ def check(problem: Problem, rate: float | None = None, delay: float | None = Non
         most_stiffness=most_stiffness(loop, B_ratio, period, late) if shaped else nan,
         least_inertia_unshaped=least_inertia(loop, 1.0, period, late) if shaped else nan,
         from_rate=stable_from(loop, late / period),
+        as_many=_as_many(changed),
     )
+
+
+def _as_many(problem: SampledProblem) -> str:
+    """Return what a rate is told with: so many periods are kept."""
+    kept = {"of delay": problem.delay, "that the sensors are late": max(problem.lateness)}
+    kinds = [name for name, late in kept.items() if late]
+    words = f"with as many periods {' and '.join(kinds)}" if kinds else ""
+    if problem.task_periods > 1:
+        words += f"{' and ' if words else 'with '}a task_rate of a {problem.task_periods}th of it"
+    return words
 
 
 def require_stable(problem: SampledProblem) -> None:

@@ -172,7 +172,10 @@ class LinearLoop:
 
     def without_actions(self) -> LinearLoop:
         """Return the loop with the tank's valve shut."""
-        still = {name: np.zeros(self.n) for name in ("posture_stiffness", "viscous_compensation")}
+        still = {
+            name: np.zeros(self.n)
+            for name in ("posture_stiffness", "posture_damping", "viscous_compensation")
+        }
         return LinearLoop(self.problem.with_numbers(still, "actions"), self.at, native=self.native)
 
     def fallback(self) -> dict[str, Array]:
