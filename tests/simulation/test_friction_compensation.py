@@ -10,6 +10,7 @@ import pytest
 
 from passiflex.errors import SizeError, UnstableLoopError
 from passiflex.passivity import audit
+from passiflex.reports.facts import facts
 from passiflex.sampled.actions import action_layout, friction_compensation
 from passiflex.simulation import Run, parse_scenario, resolve, simulate
 from passiflex.simulation.cautions import cautions
@@ -136,3 +137,10 @@ def test_a_list_of_other_length_is_refused() -> None:
 def test_it_is_read_back_from_its_own_text() -> None:
     scenario = world(actions=EQUAL)
     assert parse_scenario(scenario.to_yaml()) == scenario
+
+
+def test_a_report_says_what_sticks_and_what_is_made_up_for() -> None:
+    run = sticking(1.6, width=0.05)
+    told = dict(facts(run, run.scenario))
+    assert told["motors"].endswith("with friction that sticks")
+    assert told["friction made up for"] == "up to 1.6 N m and 0 N m s/rad, as the valve is open"

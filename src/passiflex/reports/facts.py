@@ -142,7 +142,14 @@ def _world(scenario: Scenario) -> Iterator[tuple[str, str]]:
     if motors is not None:
         limit = "torques not limited" if motors.torque_limit == "none" else "torques limited"
         rubbing = np.any(motors.coulomb_friction) or np.any(motors.viscous_friction)
-        yield "motors", f"{limit}, {'with' if rubbing else 'no'} friction"
+        sticks = " that sticks" * (motors.friction == "sticks" and bool(np.any(motors.coulomb_friction)))
+        yield "motors", f"{limit}, {'with' if rubbing else 'no'} friction{sticks}"
+    actions = scenario.actions
+    if actions is not None and actions.compensates:
+        dry, viscous = (
+            f"{np.max(most):g}" for most in (actions.coulomb_compensation, actions.viscous_compensation)
+        )
+        yield "friction made up for", f"up to {dry} N m and {viscous} N m s/rad, as the valve is open"
     noise = scenario.noise
     if noise is not None and (noise.torque_variance or not (noise.link_deviation or noise.motor_deviation)):
         yield (
