@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from passiflex.errors import ValueRangeError
 from passiflex.robots.frames import world_frames
 from passiflex.simulation import resolve
 from passiflex.simulation.start_cautions import swallowed_joints
@@ -23,12 +24,19 @@ def joints() -> np.ndarray:
 
 
 def test_a_sphere_about_a_joint_swallows_it() -> None:
-    base, elbow = joints()
+    elbow = joints()[1]
     one = {"kind": "sphere", "name": "ball", "centre": elbow.tolist(), "radius": 0.05, "stiffness": 1e4}
     assert [line[:40] for line in told(one)] == ["joint 2 is within ball at the start: the"]
+
+
+def test_a_surface_about_all_joints_swallows_the_robot() -> None:
+    base, elbow = joints()
     both = {"kind": "sphere", "name": "ball", "centre": ((base + elbow) / 2).tolist(), "stiffness": 1e4}
     reach = float(np.linalg.norm(elbow - base)) / 2
-    assert told(both | {"radius": reach + 2e-3})[0].startswith("joints 1, 2 are within ball")
+    with pytest.raises(
+        ValueRangeError, match="ball swallows the robot; got all 2 joints within it at the start"
+    ):
+        told(both | {"radius": reach + 2e-3})
     assert told(both | {"radius": reach - 2e-3}) == ()
 
 

@@ -142,6 +142,17 @@ class Surface(AbstractLabelled):
                     try_=f"a place {1e3 * depth:.3g} mm or more along [{way}]",
                 )
 
+    def require_outside(self, joints: NDArray[np.float64]) -> None:
+        """Raise ValueRangeError if all joints (n, 3) [m] are within it; a plane has no inside that could be one."""
+        depths = self.depths(joints)
+        if self.shape.sizes and (depths > 0).all():
+            raise ValueRangeError(
+                f"{self.label} swallows the robot",
+                got=f"all {len(joints)} joints within it at the start, {depths.min():.3g} to {depths.max():.3g} m deep",
+                needs="a robot outside; its hand alone touches what is around it",
+                try_="another place, or a smaller size",
+            )
+
     def depths(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return how deep points (k, 3) [m] in world axes are within it (k,), before it moves; negative outside."""
         g = self._own(SimpleNamespace(**self.numbers(0)), self.parameters(0))

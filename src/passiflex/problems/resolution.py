@@ -85,7 +85,7 @@ def resolve(scenario: Scenario, robot: FlexibleJointRobot | None = None) -> Prob
     home = posture(robot, q + softer * (theta - q), model).pose
     # The law's own damping goes by the robot as described; its weight is the true one.
     start = at_start._replace(mass_matrix=posture(robot, q, described).mass_matrix)
-    known = Known(elements_of(scenario, robot, at_start.pose), plant, model, q, start)
+    known = Known(elements_of(scenario, robot, at_start.pose, q), plant, model, q, start)
     common: dict[str, Any] = _as_written(scenario) | {
         "law": law,
         "elements": known.elements,

@@ -3,30 +3,36 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from passiflex.control.motion import Pose
 from passiflex.elements import AbstractElement, MotorFriction, SpeedBrake, StickingFriction
 from passiflex.elements.end_stops import NO_END
+from passiflex.elements.surface import Surface
 from passiflex.loops.plant import Elements
 from passiflex.problems.per_joint import per_joint
 from passiflex.problems.problem import Lasting
 from passiflex.robots.flexible import FlexibleJointRobot
+from passiflex.robots.frames import world_frames
 from passiflex.scenarios.environment import labelled
 from passiflex.scenarios.held_settings import Load
 from passiflex.scenarios.motor_settings import MotorSettings
 from passiflex.scenarios.scenario import Scenario
 from passiflex.scenarios.touching import Site
 
+Array = NDArray[np.float64]
+
 BRAKING = 0.01
 """Time [s] within which a motor comes back to its speed limit."""
 
 
-def elements_of(scenario: Scenario, robot: FlexibleJointRobot, at: Pose) -> Elements:
+def elements_of(scenario: Scenario, robot: FlexibleJointRobot, at: Pose, q: Array) -> Elements:
     """Return what touches a scenario's robot: friction first, whose books a sampled run always has; all drags are one.
 
     Parameters
     ----------
     at: Where the end effector starts.
+    q: Where the joints do (n,).
 
     Raises
     ------
@@ -50,6 +56,8 @@ def elements_of(scenario: Scenario, robot: FlexibleJointRobot, at: Pose) -> Elem
     others = {e.structure: e for e in (entry.build(name, site) for name, entry in entries)}
     for element in others.values():
         element.require_apart(at)
+        if isinstance(element, Surface):
+            element.require_outside(world_frames(robot.arm.chain, q[None]).position[0, 1:-1])
     return (*[friction] * (rubs or scenario.control is not None), *brakes, *others.values())
 
 
