@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from passiflex.errors import ValueRangeError
+from passiflex.errors import ScenarioError, ValueRangeError
 from passiflex.robots.frames import world_frames
 from passiflex.simulation import resolve
 from passiflex.simulation.start_cautions import swallowed_joints
@@ -50,3 +50,26 @@ def test_a_base_stands_on_its_table(height: float, swallows: bool) -> None:
         "stiffness": 1e4,
     }
     assert bool(told(table)) == swallows
+
+
+def test_a_joint_beyond_its_end_stop_is_refused() -> None:
+    stops = {"kind": "end_stops", "lower": [-1, -1], "upper": [0.4, 2]}
+    with pytest.raises(
+        ValueRangeError, match=r"joint 1 starts beyond its end stop; got 0.5 rad; needs -1 to 0.4 rad"
+    ):
+        told(stops)
+    assert told(stops | {"upper": [0.5, 2]}) == ()
+
+
+def test_end_stops_have_no_name_of_their_own() -> None:
+    with pytest.raises(
+        ScenarioError, match="a run calls them end_stops, as there is one of their kind; remove it"
+    ):
+        told({"kind": "end_stops", "name": "stops"})
+
+
+def test_smooth_friction_uses_nothing_of_what_sticks() -> None:
+    with pytest.raises(
+        ScenarioError, match=r"motors.static_friction: friction that is smooth does not use it"
+    ):
+        world(motors={"coulomb_friction": 1, "static_friction": 2})

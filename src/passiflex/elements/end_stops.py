@@ -8,14 +8,17 @@ from typing import Any, ClassVar, Protocol, final
 
 import casadi as cs
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from passiflex.elements.element import AbstractElement, Effect, Mobility, Port, Touch, nothing
 from passiflex.elements.normal import HuntCrossley
+from passiflex.errors import ValueRangeError
 from passiflex.layout import Field, Layout
 
 NO_END = 1e9
 """Of a joint that may go as far as it will [rad, m]."""
+ROUND_OFF = 1e-9
+"""By which a joint that starts at its stop may be beyond it [rad, m]."""
 
 
 class StopNumbers(Protocol):
@@ -71,6 +74,19 @@ class EndStops(AbstractElement):
             "stop_stiffness": np.broadcast_to(self.stiffness, n),
             "stop_dissipation": self.dissipation,
         }
+
+    def require_between(self, q: NDArray[np.float64]) -> None:
+        """Raise ValueRangeError for joints (n,) that start beyond their stops."""
+        lower, upper = (np.broadcast_to(np.asarray(end, float), q.shape) for end in (self.lower, self.upper))
+        beyond = np.maximum(lower - q, q - upper)
+        joint = int(np.argmax(beyond))
+        if beyond[joint] > ROUND_OFF:
+            raise ValueRangeError(
+                f"joint {joint + 1} starts beyond its end stop",
+                got=f"{q[joint]:.4g} rad",
+                needs=f"{lower[joint]:.4g} to {upper[joint]:.4g} rad",
+                try_="another posture, or stops further out",
+            )
 
     def rate(self, free: Mobility) -> float:
         """Return how fast a link swings on its stop."""

@@ -14,6 +14,7 @@ from passiflex.limits.inertia_search import InertiaSearch, UnattainableError
 from passiflex.limits.margin_box import MarginBox
 from passiflex.limits.recommendation import Recommendation
 from passiflex.problems.altered import rewritten
+from passiflex.problems.free_space import in_free_space
 from passiflex.problems.problem import SampledProblem, require_sampled
 from passiflex.robots.flexible import FlexibleJointRobot
 from passiflex.simulation import parse_scenario, resolve
@@ -48,7 +49,8 @@ class Attempt:
         shaping = {"shaped_stiffness": {"ratio": 1}, "shaped_inertia": {"ratio": 1}}
         control = {"inner_loop": inner, "external_torque": "none", "allow_unstable": False}
         text = rewritten(scenario, {"law": shaping, "control": control})
-        self.problems = tuple(_sampled(rewritten(text, {"posture": q.tolist()}), robot) for q in places)
+        there = (_sampled(rewritten(text, {"posture": q.tolist()}), robot) for q in places)
+        self.problems = tuple(map(in_free_space, there))
 
     def begun(self, margin: float) -> InertiaSearch:
         """Return a search whose ratios hold on the members that mostly decide: less it cannot be.

@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from passiflex.control.gravity import RobotGravity
 from passiflex.errors import ValueRangeError
 from passiflex.limits.margin_box import MarginBox, Member, Worst
 from passiflex.limits.torque_noise import torque_by_noise
@@ -232,9 +233,10 @@ class InertiaSearch:
         values = lasting(loop.matrix(None, late, heavy), loop.cycle(), loop.task_jacobian)
         slow = values[~trembles(values, loop.cycle())]
         falls = np.abs(slow).max(initial=0.0) >= 1
-        what = (
-            "a slow motion falls away, as K_x is soft for the weight that is off" if falls else "it trembles"
-        )
+        what = "it trembles"
+        if falls:
+            weight = not isinstance(loop.problem.law.gravity, RobotGravity)
+            what = "a slow motion does not die out" + ", as K_x is soft for the weight that is off" * weight
         return f"{self.box.words(member)}; {what}"
 
     def _excess(self, member: Member) -> Array:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from passiflex.limits.margin_box import NEAR, MarginBox, Worst
+from passiflex.problems.free_space import in_free_space
 from passiflex.problems.problem import SampledProblem
 
 MOST = 0.3
@@ -63,6 +64,6 @@ def own_margin(problem: SampledProblem) -> OwnMargin:
 
 
 def _worst(problem: SampledProblem, share: float, *, thorough: bool) -> tuple[Worst, str]:
-    box = MarginBox((problem,), share)
+    box = MarginBox((in_free_space(problem),), share)
     worst = box.search({}, 0, thorough=thorough)
     return worst, box.words(worst.member)

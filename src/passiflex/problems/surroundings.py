@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from passiflex.control.motion import Pose
 from passiflex.elements import AbstractElement, MotorFriction, SpeedBrake, StickingFriction
-from passiflex.elements.end_stops import NO_END
+from passiflex.elements.end_stops import NO_END, EndStops
 from passiflex.elements.surface import Surface
 from passiflex.loops.plant import Elements
 from passiflex.problems.per_joint import per_joint
@@ -56,6 +56,8 @@ def elements_of(scenario: Scenario, robot: FlexibleJointRobot, at: Pose, q: Arra
     others = {e.structure: e for e in (entry.build(name, site) for name, entry in entries)}
     for element in others.values():
         element.require_apart(at)
+        if isinstance(element, EndStops):
+            element.require_between(q)
         if isinstance(element, Surface):
             element.require_outside(world_frames(robot.arm.chain, q[None]).position[0, 1:-1])
     return (*[friction] * (rubs or scenario.control is not None), *brakes, *others.values())

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from passiflex.errors import SizeError
 from passiflex.scenarios.held_settings import Load, Person
@@ -61,6 +61,14 @@ class EndStops(AbstractTouching):
     upper: Annotated[tuple[float, ...], Quantity("rad", ((None,),))] | None = Field(
         default=None, description="and at the other end, rad"
     )
+
+    @model_validator(mode="after")
+    def _by_their_kind(self) -> Self:
+        if self.name not in ("", self.usual):
+            raise Mistakes(
+                (("name",), f"a run calls them {self.usual}, as there is one of their kind; remove it")
+            )
+        return self
 
     def build(self, label: str, site: Site) -> AbstractElement:
         """Return the stops."""

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from passiflex.scenarios.control_settings import ENDLESS, PerJoint, Vector
 from passiflex.texts.quantity import Quantity
@@ -13,6 +13,8 @@ from passiflex.texts.section import Mistakes, Section
 
 NAMED = ("none", "robot")
 TorqueLimit = Annotated[str | float | Vector, Quantity("N m", PerJoint, above=0, names=NAMED)]
+STICKING = ("static_friction", "stribeck_speed", "break_away")
+"""Entries of friction that sticks."""
 SpeedLimit = Annotated[str | float | Vector, Quantity("rad/s", PerJoint, above=0, names=NAMED)]
 
 
@@ -55,6 +57,15 @@ class MotorSettings(Section):
     break_away: Annotated[float, Quantity("rad", above=0)] = Field(
         default=1e-4, description="by which a motor gives way before it slips, seen from the link, rad"
     )
+
+    @model_validator(mode="after")
+    def _of_what_sticks(self) -> Self:
+        fields = type(self).model_fields
+        unused = [n for n in STICKING if getattr(self, n) != fields[n].default and self.friction == "smooth"]
+        if unused:
+            what = "friction that is smooth does not use it; take friction: sticks"
+            raise Mistakes(*(((name,), what) for name in unused))
+        return self
 
     def require_unlimited(self) -> None:
         """Raise Mistakes for limits, which only a sampled run has."""

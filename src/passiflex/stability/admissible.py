@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -45,7 +45,8 @@ class Admissible(NamedTuple):
     most_stiffness: Largest stable K_e/K with the problem's B_e; 0 if there is none.
     least_inertia_unshaped: Smallest stable B_e/B with K_e = K; inf if there is none.
     from_rate: Rate from which the problem's gains are stable, with as many periods of delay [Hz]; inf if none.
-    as_many: What goes along with that rate, in words.
+    lateness: Of the sensor that is latest [s]; it goes along with that rate as well.
+    task_periods: From one run of the outer loop to the next, likewise.
     """
 
     judgement: Judgement
@@ -58,7 +59,8 @@ class Admissible(NamedTuple):
     most_stiffness: float
     least_inertia_unshaped: float
     from_rate: float
-    as_many: str = ""
+    lateness: float = 0.0
+    task_periods: int = 1
 
     @property
     def stable(self) -> bool:
@@ -110,7 +112,16 @@ class Admissible(NamedTuple):
             words.append(f"your gains are stable from {hertz(self.from_rate)} on")
         else:
             words.append(f"your gains are stable at no rate up to {hertz(RATES[1])}")
-        return " ".join([*words, self.as_many]).rstrip()
+        return " ".join([*words, *self._as_many()])
+
+    def _as_many(self) -> Iterator[str]:
+        """Yield what a rate is told with: so many periods are kept."""
+        kept = {"of delay": self.delay, "that the sensors are late": self.lateness}
+        kinds = [name for name, late in kept.items() if late > 0]
+        if kinds:
+            yield f"with as many periods {' and '.join(kinds)}"
+        if self.task_periods > 1:
+            yield f"{'and' if kinds else 'with'} a task_rate of a {self.task_periods}th of it"
 
 
 def check(problem: Problem, rate: float | None = None, delay: float | None = None) -> Admissible:
@@ -139,18 +150,9 @@ def check(problem: Problem, rate: float | None = None, delay: float | None = Non
         most_stiffness=most_stiffness(loop, B_ratio, period, late) if shaped else nan,
         least_inertia_unshaped=least_inertia(loop, 1.0, period, late) if shaped else nan,
         from_rate=stable_from(loop, late / period),
-        as_many=_as_many(changed),
+        lateness=max(changed.lateness),
+        task_periods=changed.task_periods,
     )
-
-
-def _as_many(problem: SampledProblem) -> str:
-    """Return what a rate is told with: so many periods are kept."""
-    kept = {"of delay": problem.delay, "that the sensors are late": max(problem.lateness)}
-    kinds = [name for name, late in kept.items() if late]
-    words = f"with as many periods {' and '.join(kinds)}" if kinds else ""
-    if problem.task_periods > 1:
-        words += f"{' and ' if words else 'with '}a task_rate of a {problem.task_periods}th of it"
-    return words
 
 
 def require_stable(problem: SampledProblem) -> None:
