@@ -9,7 +9,7 @@ import pytest
 
 from passiflex.problems.resolution import resolve
 from passiflex.simulation.cautions import cautions
-from passiflex.simulation.jump_cautions import far_jumps
+from passiflex.simulation.jump_cautions import far_jumps, racing
 from passiflex.simulation.turn_cautions import far_turns
 from work import calls
 from worlds import world
@@ -35,7 +35,21 @@ def test_a_table_of_other_units_is_found_by_its_first_row() -> None:
     assert said({"rows": "t,x,y,z\n0,400,0,500\n1,400,0,500\n"}).startswith("at 0 s the reference jumps by 6")
 
 
-@pytest.mark.parametrize("ask", [far_jumps, far_turns])
+def test_a_table_of_other_units_is_found_by_how_fast_it_goes() -> None:
+    """Millimetres from where the hand is, linear from row to row: nothing jumps."""
+    table = {"rows": "t,x,y,z\n0,0,0,0\n0.1,0,0,-80\n", "relative": True}
+    assert not said(table)
+    (line,) = racing(resolve(world(reference=table)))
+    assert line.startswith(
+        "from 0 s on the reference moves by 80 m in 0.1 s, 800 m/s, which no hand can follow;"
+    )
+    assert line in cautions(resolve(world(reference=table)))
+    metres = {"rows": "t,x,y,z\n0,0,0,0\n0.1,0,0,-0.08\n", "relative": True}
+    assert racing(resolve(world(reference=metres))) == ()
+    assert racing(resolve(world())) == ()
+
+
+@pytest.mark.parametrize("ask", [far_jumps, far_turns, racing])
 def test_the_work_grows_as_the_number_of_rows(ask: Any) -> None:
     law = {"task": "pose", "stiffness": {"rotation": [9, 0, 9]}, "damping": {"rotation": [1, 0, 1]}}
     law |= {"regularisation": 0.01}

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from passiflex.problems.problem import Problem
 from passiflex.simulation.book_cautions import book_cautions
 from passiflex.simulation.friction_cautions import much_compensation
-from passiflex.simulation.jump_cautions import far_jumps
+from passiflex.simulation.jump_cautions import far_jumps, racing
 from passiflex.simulation.stability_cautions import stability_cautions
 from passiflex.simulation.start_cautions import singular_start, swallowed_joints
 from passiflex.simulation.turn_cautions import far_turns, large_moments
@@ -17,6 +17,7 @@ CAUTIONS: tuple[Callable[[Problem], tuple[str, ...]], ...] = (
     singular_start,
     swallowed_joints,
     far_jumps,
+    racing,
     far_turns,
     large_moments,
     much_compensation,
