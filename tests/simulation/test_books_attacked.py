@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections import Counter
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -108,13 +109,18 @@ def attacked(data: dict[str, Any]) -> Attacked:
     return Attacked(verdict.verdict, beyond, verdict.margin, warned)
 
 
-def attack(runs: int, seed: int) -> list[tuple[int, dict[str, Any], Attacked]]:
+def attack(
+    runs: int,
+    seed: int,
+    draw: Callable[[np.random.Generator], dict[str, Any]] = case,
+    tried: Callable[[dict[str, Any]], Attacked] = attacked,
+) -> list[tuple[int, dict[str, Any], Attacked]]:
     """Return the cases that break a promise; prints what became of all."""
     fates: Counter[str] = Counter()
     broken = []
     for i in range(runs):
-        data = case(np.random.default_rng([seed, i]))
-        found = attacked(data)
+        data = draw(np.random.default_rng([seed, i]))
+        found = tried(data)
         fates[found.fate] += 1
         violated = found.fate == "violated" and found.margin < -SMALL and not found.warned
         if found.beyond > BEYOND or violated or found.fate.startswith("mistake"):

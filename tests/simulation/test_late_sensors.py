@@ -137,7 +137,7 @@ def test_the_border_is_where_simulations_begin_to_grow(entry: str) -> None:
     for share in (0.9, 1.1):
         run = simulate_unchecked(problem(share * low))
         speeds = [np.abs(run["dq"][run.time > t][:1000]).max() for t in (0.5, 2.9)]
-        assert bool(run.failure) or (speeds[1] > speeds[0]) == (share > 1)
+        assert (bool(run.failure) or speeds[1] > speeds[0]) == (share > 1)
 
 
 def test_at_another_rate_it_is_as_late_in_seconds() -> None:

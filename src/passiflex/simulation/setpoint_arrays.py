@@ -6,14 +6,12 @@ from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydantic import ValidationError
 from scipy.spatial.transform import Rotation
 
-from passiflex.errors import ScenarioError, SizeError, ValueRangeError
+from passiflex.errors import ValueRangeError
 from passiflex.scenarios.setpoint_rows import POSITION, QUATERNION, SPIN, TURN, VELOCITY, gain_names
 from passiflex.scenarios.setpoints import Stream, Table
-from passiflex.texts.model_mistakes import told
-from passiflex.texts.number_table import written
+from passiflex.simulation.array_table import ArrayTable, numbers_of
 
 Array = NDArray[np.float64]
 
@@ -54,56 +52,23 @@ def setpoint_table(
     ScenarioError
         For rows that a file could not have either.
     """
-    t = numbers_of("time", time)
-    if t.ndim != 1 or not t.size:
-        raise SizeError("time", got=f"shape {t.shape}", needs="(N,)")
-    names, columns = ["t"], [t[:, None]]
-
-    def add(name: str, given: ArrayLike | None, shapes: dict[tuple[int, ...], tuple[str, ...]]) -> None:
-        if given is None:
-            return
-        values = numbers_of(name, given)
-        if values.shape[:1] != t.shape or values.shape[1:] not in shapes:
-            needs = " or ".join(str((t.size, *shape)) for shape in shapes)
-            raise SizeError(name, got=f"shape {values.shape}", needs=needs)
-        names.extend(shapes[values.shape[1:]])
-        columns.append(values.reshape(t.size, -1))
-
-    add("position", position, {(3,): POSITION})
+    table = ArrayTable(time)
+    table.add("position", position, {(3,): POSITION})
     if isinstance(rotation, Rotation):
         rotation = rotation.as_quat()
     elif rotation is not None and (R := numbers_of("rotation", rotation)).ndim == 3 and R.shape[1:] == (3, 3):
         rotation = _quaternions(R)
-    add("rotation", rotation, {(3,): TURN, (4,): QUATERNION})
-    add("velocity", velocity, {(3,): VELOCITY})
-    add("spin", spin, {(3,): SPIN})
+    table.add("rotation", rotation, {(3,): TURN, (4,): QUATERNION})
+    table.add("velocity", velocity, {(3,): VELOCITY})
+    table.add("spin", spin, {(3,): SPIN})
     for name, gains in (("stiffness", stiffness), ("damping", damping)):
         shapes: dict[tuple[int, ...], tuple[str, ...]] = {}
         shapes |= {(k,): gain_names(name[0].replace("s", "k"), k) for k in (3, 6)}
         shapes |= {(k, k): gain_names(name[0].replace("s", "k"), k, in_full=True) for k in (3, 6)}
-        add(name, gains, shapes)
-    data = {
-        "kind": "table",
-        "rows": written(names, np.hstack(columns)),
-        "at": at,
-        "between": between,
-        "relative": relative,
-        "axes": axes,
-        "stream": stream,
-    }
-    try:
-        return Table.model_validate(data)
-    except ValidationError as error:
-        raise ScenarioError("table", told(error, data, Table)) from None
-
-
-def numbers_of(name: str, given: Any) -> Array:
-    """Return an array of numbers."""
-    try:
-        values = np.asarray(given, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise ValueRangeError(name, got=type(given).__name__, needs="an array of numbers") from None
-    return values
+        table.add(name, gains, shapes)
+    return table.build(
+        Table, kind="table", at=at, between=between, relative=relative, axes=axes, stream=stream
+    )
 
 
 def _quaternions(R: Array) -> Array:

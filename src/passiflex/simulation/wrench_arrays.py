@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-import numpy as np
 from numpy.typing import ArrayLike
-from pydantic import ValidationError
 
-from passiflex.errors import ScenarioError, SizeError
 from passiflex.scenarios.forces import FORCE, MOMENT, WrenchTable
-from passiflex.simulation.setpoint_arrays import numbers_of
-from passiflex.texts.model_mistakes import told
-from passiflex.texts.number_table import written
+from passiflex.simulation.array_table import ArrayTable
 
 
 def wrench_table(
@@ -33,19 +28,7 @@ def wrench_table(
     ScenarioError
         For rows that a file could not have either.
     """
-    t = numbers_of("time", time)
-    if t.ndim != 1 or not t.size:
-        raise SizeError("time", got=f"shape {t.shape}", needs="(N,)")
-    names, columns = ["t"], [t[:, None]]
-    for name, given, named in (("force", force, FORCE), ("moment", moment, MOMENT)):
-        if given is not None:
-            values = numbers_of(name, given)
-            if values.shape != (t.size, 3):
-                raise SizeError(name, got=f"shape {values.shape}", needs=f"{(t.size, 3)}")
-            names.extend(named)
-            columns.append(values)
-    data = {"rows": written(names, np.hstack(columns)), "at": at}
-    try:
-        return WrenchTable.model_validate(data)
-    except ValidationError as error:
-        raise ScenarioError("table", told(error, data, WrenchTable)) from None
+    table = ArrayTable(time)
+    table.add("force", force, {(3,): FORCE})
+    table.add("moment", moment, {(3,): MOMENT})
+    return table.build(WrenchTable, at=at)

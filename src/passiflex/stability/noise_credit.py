@@ -7,6 +7,7 @@ multiplies −½ (τ_k+1 − τ_k−1) in Σw, of which only τ_k+1 may already 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from itertools import cycle, islice
 
@@ -34,10 +35,10 @@ def mean_credit(periods: Sequence[DrivenLoop], joints: int, variance: float, las
     Each sample of the noise lasts for so many periods L, and is independent of all before it, so that only
     its own answer counts: with R_j the derivative of q_j by a noise held from period 0 on, by parts,
     −½ σ² tr(R_L + R_L−1) / L. The first `joints` states are q. An answer of more than `REACH` ends there.
-    Noise begins in any of the periods of a cycle: the mean of them all.
+    Of a cycle, noise begins in the first period and every L periods from there: the mean over where that is in it.
     """
-    found = [_credit([*periods[k:], *periods[:k]], joints, variance, lasting) for k in range(len(periods))]
-    return float(np.mean(found))
+    begins = range(0, len(periods), math.gcd(lasting, len(periods)))
+    return float(np.mean([_credit([*periods[k:], *periods[:k]], joints, variance, lasting) for k in begins]))
 
 
 def _credit(periods: Sequence[DrivenLoop], joints: int, variance: float, lasting: int) -> float:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from passiflex.diagrams import Viewed
 from passiflex.extras import MissingExtraError
 from passiflex.files import require_writable
+from passiflex.metrics.contact import left
 from passiflex.passivity import audit
 from passiflex.plotting.contact import Approach, draw_approaches
 from passiflex.plotting.figures import save_figure
@@ -34,8 +35,6 @@ BEFORE, AFTER = 0.2, 1.5
 """Time before the move, and after it [s]."""
 STEADY = 0.3
 """Time at the end of a run [s] whose force is called steady."""
-TOUCHES = 0.1
-"""Force [N] from which on the hand is on the wall."""
 CRITICAL: dict[str, Any] = {"translation": 2 * 500**0.5, "rotation": 2 * 30**0.5}
 """2√K, as public controllers have it, whatever the inertia."""
 ENDLESS = 1000.0
@@ -121,12 +120,12 @@ def approach(law: str, stiffness: float, speed: float) -> Scenario:
 def felt(run: Run) -> Felt:
     """Return what the wall felt."""
     force, result = np.linalg.norm(run["wall_force"], axis=1), audit(run)
-    late, on = force[run.time > run.time[-1] - STEADY], force > TOUCHES
+    late = force[run.time > run.time[-1] - STEADY]
     return Felt(
         peak=float(force.max()),
         steady=float(late.mean()),
         trembling=float(late.std()),
-        bounces=int((on[:-1] & ~on[1:]).sum()),
+        bounces=left(force),
         given=float(-run["wall_given_energy"].min()),
         margin=result.margin,
         verdict=result.verdict,
