@@ -12,7 +12,6 @@ import scipy.linalg
 from passiflex.errors import ScenarioError, UnstableLoopError
 from passiflex.limits import check
 from passiflex.limits.own_margin import own_margin
-from passiflex.limits.torque_noise import torque_by_noise
 from passiflex.native import find_compiler
 from passiflex.passivity import audit
 from passiflex.problems.altered import altered
@@ -22,7 +21,6 @@ from passiflex.simulation.batch import simulate_batch
 from passiflex.simulation.simulate_sampled import longest_step, start
 from passiflex.stability.linear_loop import LinearLoop
 from passiflex.stability.loop_at_rest import loop_at_rest
-from passiflex.stability.noise_credit import noise_credit
 from simulation.test_linear_loop import D_X, K_X, LENGTH, B, D, K, one_joint
 from worlds import world
 
@@ -173,15 +171,8 @@ def test_rates_keep_their_ratio_when_one_is_altered() -> None:
     assert check(slow(), rate=2000).stable
 
 
-def test_margin_and_noise_know_both_rates() -> None:
-    """Noise of the sensors acts through the inner loop, which goes on; a margin is no larger than with one rate."""
-    noisy = {"noise": {"torque_variance": 0.2, "hold": 0.02}}
-    quick, held = require_sampled(resolve(world(**noisy))), slow(**noisy)
-    assert own_margin(held).share <= own_margin(quick).share
-    ratio = noise_credit(held) / noise_credit(quick)
-    assert 0.5 < ratio < 2
-    louder = torque_by_noise(LinearLoop(held), 0.2) / torque_by_noise(LinearLoop(quick), 0.2)
-    assert ((louder > 0.8) & (louder < 1.25)).all()
+def test_a_margin_knows_both_rates() -> None:
+    assert own_margin(slow()).share < own_margin(require_sampled(resolve(world()))).share
 
 
 @pytest.mark.skipif(find_compiler() is None, reason="no compiler")
