@@ -16,6 +16,7 @@ import passiflex
 from cli.shell import Shell
 from passiflex.passivity import audit
 from passiflex.simulation import Run, parse_scenario, passed_limits, simulate
+from passiflex.studies.reproduce import FIGURES, STUDIES
 from worlds import PLANAR, by_rows, ran
 
 WRONG = """\
@@ -229,12 +230,15 @@ def test_an_unknown_figure_names_the_nearest(shell: Shell, tmp_path: Path) -> No
     result = shell("reproduce", "figg1", "--out", tmp_path / "new")
     assert result.status == 2
     assert result.err.startswith(
-        "passiflex: unknown figure; got 'figg1'; "
-        "needs one of contact, fig1, fig2, fig3, grip, hands, policy, polishing, sampled, uncertainty, walls; "
-        "try 'fig1'"
+        f"passiflex: unknown figure; got 'figg1'; needs one of {', '.join(sorted((*FIGURES, *STUDIES)))}; try 'fig1'"
     )
     assert len(result.err.splitlines()) == 1
     assert not (tmp_path / "new").exists()
+
+
+def test_its_help_names_every_study(shell: Shell) -> None:
+    told = re.findall("[a-z]+", shell("reproduce", "--help").out.partition("The studies are")[2])
+    assert set(STUDIES) <= set(told)
 
 
 def test_sensitivity_takes_no_figures(shell: Shell, tmp_path: Path) -> None:

@@ -58,11 +58,7 @@ def reproduce(
 ) -> dict[str, list[Path]]:
     """Run the given figures, and return what was written into `folder`, by figure.
 
-    The paper's three if none is given; `sampled` is the study of the sampled world, `uncertainty` that of a
-    thousand robots, `contact` that of hands that come to walls, `polishing` that of friction and the tank, `grip`
-    that of a load that the law does not know, `policy` that of set-points and stiffness at 15 Hz,
-    `hands` that of forces that a hand may be pressed with,
-    `walls` a campaign over walls.
+    The paper's three if none is given; those of `STUDIES` are ours.
 
     Each figure gives a PNG, a PDF, its runs as netCDF and a page to look at one of them; all give their part
     of `summary.json`, which keeps what earlier calls wrote about other figures of the same version.
