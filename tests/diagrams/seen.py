@@ -55,6 +55,8 @@ WALL = {
     "relative": True,
     "stiffness": 1e3,
 }
+LOAD = {"kind": "load", "mass": 0.3, "from": 0.4, "to": 0.8}
+STOPS = {"kind": "end_stops", "lower": [-2, -2, -2], "upper": [2, 0.72, 2], "stiffness": 200}
 _PLAIN = PUSHED["law"] | {"shaped_stiffness": {"ratio": 1}}
 POOR = {"kind": "port", "initial": 0.13}
 
@@ -80,6 +82,11 @@ def rigid() -> Run:
 def touching() -> Run:
     """Return a sampled run whose hand comes to a wall that is above where it starts."""
     return simulated(law=_PLAIN, control=CONTROL, environment=[WALL], output_interval=0.001)
+
+
+def laden() -> Run:
+    """Return a sampled run with a load for a while, and a joint that comes to its end."""
+    return simulated(law=_PLAIN, control=CONTROL, environment=[LOAD, STOPS], output_interval=0.001)
 
 
 def held_back() -> Run:

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from passiflex.elements.element import AbstractElement, Effect, Mobility, Port, Touch, nothing
-from passiflex.elements.normal import HuntCrossley
+from passiflex.elements.normal import HuntCrossley, Pressed
 from passiflex.errors import ValueRangeError
-from passiflex.layout import Field, Layout
+from passiflex.layout import Field, Layout, Signal
 
 NO_END = 1e9
 """Of a joint that may go as far as it will [rad, m]."""
@@ -94,15 +94,28 @@ class EndStops(AbstractElement):
 
     def act(self, at: Touch, s: Any, m: StopNumbers) -> Effect:
         """Return the torque on the links."""
-        q, dq = at.x.q, at.x.dq
-        ends = ((1, m.lower_stop - q), (-1, q - m.upper_stop))
-        pressed = [
-            (way, HuntCrossley().press(cs.fmax(depth, 0), -way * dq, m.stop_stiffness, m.stop_dissipation))
-            for way, depth in ends
-        ]
-        none = nothing(q.numel())
+        pressed = self._pressed(at, m)
+        none = nothing(at.x.q.numel())
         return none._replace(
-            link=sum((way * p.force for way, p in pressed), none.link),
+            link=self._torque(pressed),
             lost=cs.sum1(sum((p.lost for _, p in pressed), none.link)),
             stored=cs.sum1(sum((p.stored for _, p in pressed), none.link)),
         )
+
+    def seen(self, at: Touch, s: Any, m: StopNumbers) -> tuple[Signal, ...]:
+        """Return the torque on the links."""
+        torque = Field(f"{self.name}_torque", (at.x.q.numel(),), "N m", "of the end stops on the links")
+        return (Signal(torque, self._torque(self._pressed(at, m))),)
+
+    def _pressed(self, at: Touch, m: StopNumbers) -> list[tuple[int, Pressed]]:
+        """Return how each end presses the links, with the direction in which it does."""
+        q, dq = at.x.q, at.x.dq
+        ends = ((1, m.lower_stop - q), (-1, q - m.upper_stop))
+        return [
+            (way, HuntCrossley().press(cs.fmax(depth, 0), -way * dq, m.stop_stiffness, m.stop_dissipation))
+            for way, depth in ends
+        ]
+
+    def _torque(self, pressed: list[tuple[int, Pressed]]) -> cs.SX:
+        (_, lower), (_, upper) = pressed
+        return lower.force - upper.force

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from passiflex.elements.element import Effect, Mobility, Touch, nothing
 from passiflex.elements.labelled import AbstractLabelled
-from passiflex.layout import Field, Layout
+from passiflex.layout import Field, Layout, Signal
 
 LET_GO = 5e-3
 """Time [s] within which a body that is let go comes to rest, and its grip with it."""
@@ -95,14 +95,8 @@ class Held(AbstractLabelled):
     def act(self, at: Touch, s: Any, m: Any) -> Effect:
         """Return what it does to the hand."""
         n = at.x.q.numel()
-        g, told, own = (
-            self._own(view, layout)
-            for view, layout in ((m, self.parameters(n)), (s, self.inputs()), (at.own, self.state(n)))
-        )
-        lever = at.axes @ g.grasp
-        hand = at.rotation @ (at.velocity + cs.cross(at.spin, at.rotation.T @ lever))
-        apart = hand - own.velocity
-        pull = g.grip_stiffness * own.stretch + g.grip_damping * apart
+        g, told, own = self._views(at, s, m)
+        lever, apart, pull = self._grip(at, g, own)
         back = g.arm_stiffness * own.way + g.arm_damping * own.velocity
         pushed = pull + g.mass * g.weight + told.push - back
         stored = (
@@ -113,7 +107,7 @@ class Held(AbstractLabelled):
         )
         returning = own.way / LET_GO if self.anchored else cs.SX.zeros(3)
         held = told.gripped > 0
-        on_hand = cs.if_else(held, -pull, 0)
+        on_hand = self._on_hand(pull, told)
         resting = g.grip_stiffness * cs.sumsqr(own.stretch) + g.mass * cs.sumsqr(own.velocity)
         resting = resting / LET_GO + g.arm_stiffness * cs.dot(own.way, returning)
         rubbing = g.grip_damping * cs.sumsqr(apart) + g.arm_damping * cs.sumsqr(own.velocity)
@@ -129,3 +123,29 @@ class Held(AbstractLabelled):
                 -cs.vertcat(own.stretch / LET_GO, returning, own.velocity / LET_GO),
             ),
         )
+
+    def seen(self, at: Touch, s: Any, m: Any) -> tuple[Signal, ...]:
+        """Return its force on the hand."""
+        g, told, own = self._views(at, s, m)
+        *_, pull = self._grip(at, g, own)
+        force = Field(f"{self.label}_force", (3,), "N", "on the hand, world axes", axes=("axis",))
+        return (Signal(force, self._on_hand(pull, told)),)
+
+    def _views(self, at: Touch, s: Any, m: Any) -> tuple[Any, Any, Any]:
+        """Return its parameters, its inputs and its state."""
+        n = at.x.q.numel()
+        return (
+            self._own(m, self.parameters(n)),
+            self._own(s, self.inputs()),
+            self._own(at.own, self.state(n)),
+        )
+
+    def _grip(self, at: Touch, g: Any, own: Any) -> tuple[cs.SX, cs.SX, cs.SX]:
+        """Return where the hand holds it, how fast that leaves it, and with what it is pulled; in world axes."""
+        lever = at.axes @ g.grasp
+        hand = at.rotation @ (at.velocity + cs.cross(at.spin, at.rotation.T @ lever))
+        apart = hand - own.velocity
+        return lever, apart, g.grip_stiffness * own.stretch + g.grip_damping * apart
+
+    def _on_hand(self, pull: cs.SX, told: Any) -> cs.SX:
+        return cs.if_else(told.gripped > 0, -pull, 0)

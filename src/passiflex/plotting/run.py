@@ -103,7 +103,7 @@ def _columns(kind: str, size: str, count: int) -> int:
     """Return how many diagrams stand beside each other."""
     if size == "slide":
         return 1 if count <= 2 else math.ceil(count / 2)
-    return 2 if kind == "torque" and size == "double" else 1
+    return 2 if kind in ("torque", "contact") and size == "double" else 1
 
 
 def _beside(labels: Iterable[str], size: Size) -> int:
