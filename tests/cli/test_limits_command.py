@@ -33,7 +33,7 @@ def test_stable_gains_end_with_0_and_the_answer(
 ) -> None:
     out = tmp_path / "new"
     result = limits(capsys, monkeypatch, scenario, "--out", out)
-    assert (result.status, result.err) == (0, "")
+    assert result.status == 0
     lines = result.out.splitlines()
     answer = check(scenario)
     assert answer.sentence in lines
@@ -45,9 +45,9 @@ def test_stable_gains_end_with_0_and_the_answer(
     assert re.search(r"│ these gains +│ 0\.\d+ +│ stable +│ settles", result.out)
     assert re.search(r"│ K_e = 1 K, B_e = \S+ B +│ 1\.\d+ +│ unstable +│ grows", result.out)
     assert "differs" not in result.out
-    assert [f"wrote {out / name}" for name in ("limits.png", "limits.pdf")] == lines[-3:-1]
+    assert [f"wrote {out / name}" for name in ("limits.png", "limits.pdf")] == lines[-2:]
     assert sorted(p.name for p in out.iterdir()) == ["limits.pdf", "limits.png"]
-    assert re.fullmatch(r"took \d+\.\d s", lines[-1])
+    assert re.fullmatch(r"took \d+\.\d s", result.err.splitlines()[-1])
 
 
 def test_unstable_gains_end_with_1(
@@ -71,10 +71,10 @@ def test_a_recommendation_can_be_pasted(
 ) -> None:
     result = limits(capsys, monkeypatch, scenario, "--recommend")
     assert re.search(
-        r"^recommended: planar2r at 1 kHz .* inner loop \(the \w+ inner loop needs ", result.out, re.M
+        r"^# recommended: planar2r at 1 kHz .* inner loop \(the \w+ inner loop needs ", result.out, re.M
     )
     assert "each joint off by up to 20 % and the delay by 0.2 periods" in result.out
-    snippet = yaml.safe_load(result.out[result.out.index("law:\n") : result.out.index("\ntook")])
+    snippet = yaml.safe_load(result.out[result.out.index("law:\n") :])
     pasted = tmp_path / "pasted.yaml"
     pasted.write_text(yaml.safe_dump(yaml.safe_load(scenario.read_text()) | snippet))
     assert check(load_scenario(pasted)).stable
@@ -96,12 +96,12 @@ def test_a_recommendation_for_a_robot_alone_can_be_pasted(
         "matched",
     ]
     result = Shell(monkeypatch, capsys)("recommend", *words)
-    assert (result.status, result.err) == (0, "")
+    assert result.status == 0
     assert re.search(
-        r"^recommended: planar2r at 1 kHz with no delay: .* the matched inner loop$", result.out, re.M
+        r"^# recommended: planar2r at 1 kHz with no delay: .* the matched inner loop$", result.out, re.M
     )
     assert "each joint off by up to 10 % and the delay by 0.1 periods" in result.out
-    snippet = yaml.safe_load(result.out[result.out.index("law:\n") : result.out.index("\ntook")])
+    snippet = yaml.safe_load(result.out)
     assert snippet["control"]["inner_loop"] == "matched"
     pasted = tmp_path / "pasted.yaml"
     pasted.write_text(yaml.safe_dump(yaml.safe_load(scenario.read_text()) | snippet))

@@ -49,10 +49,10 @@ def test_a_name_is_shown_as_it_is_while_work_goes_on(
     name: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setenv("FORCE_COLOR", "1")
-    monkeypatch.setattr("passiflex.cli.terminal.console", PlainConsole())
+    monkeypatch.setattr("passiflex.cli.terminal.aside", PlainConsole(stderr=True))
     with progress_lines() as report:
         report(name)
-    assert name in capsys.readouterr().out
+    assert name in capsys.readouterr().err
 
 
 def test_a_name_does_not_steer_the_terminal(capsys: pytest.CaptureFixture[str], shell: Shell) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+
 from diagrams.seen import altered, continuous, held_back, laden, touching, without
 from passiflex.diagrams import Viewed, panels, touched
 from passiflex.simulation import Run

@@ -96,7 +96,7 @@ def recommend(
         InnerLoop | None, cyclopts.Parameter(help="the better of the two if left out")
     ] = None,
 ) -> int:
-    """Find gains that hold with a margin, as sections of a scenario; exit status 2 if there are none.
+    """Find gains that hold with a margin, as sections of a scenario, in YAML; exit status 2 if there are none.
 
     Of a robot alone with the stiffness and damping of `passiflex.recommend`, of a scenario with its own.
     """
@@ -148,5 +148,7 @@ def _print_recommendation(problem: Problem, inner_loop: str | None) -> None:
 
 
 def _print_advice(advice: Recommendation) -> None:
-    console.print(f"recommended: {advice.sentence}")
+    """Print gains as they stand in a scenario file, what they are good for as comments, so that all can be piped."""
+    for line in f"recommended: {advice.sentence}".splitlines():
+        console.print(f"# {line}")
     console.print(advice.snippet)

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 class PlainConsole(Console):
     """A console for which text is text: no markup, no emoji codes, no sequences that steer a terminal."""
 
-    def __init__(self) -> None:
-        super().__init__(soft_wrap=True, highlight=False, markup=False, emoji=False)
+    def __init__(self, *, stderr: bool = False) -> None:
+        super().__init__(stderr=stderr, soft_wrap=True, highlight=False, markup=False, emoji=False)
 
     def render_str(self, text: str, **options: Any) -> Text:
         """Return a text as it is shown, in lines and tables alike."""
@@ -41,6 +41,8 @@ class PlainConsole(Console):
 
 
 console = PlainConsole()
+aside = PlainConsole(stderr=True)
+"""What is said about the work: it does not come between the lines of an answer that is piped on."""
 
 
 @contextmanager
@@ -48,19 +50,19 @@ def timed() -> Iterator[None]:
     """Print how long the block took, if it got to its end."""
     start = time.perf_counter()
     yield
-    console.print(f"took {time.perf_counter() - start:.1f} s")
+    aside.print(f"took {time.perf_counter() - start:.1f} s")
 
 
 @contextmanager
 def progress_lines() -> Iterator[Callable[[str], None]]:
     """Give a function that shows what is being done: live on a terminal, a line each otherwise."""
-    if not console.is_terminal:
-        yield lambda text: console.print(text)
+    if not aside.is_terminal:
+        yield lambda text: aside.print(text)
         return
-    with console.status("starting") as status:
+    with aside.status("starting") as status:
 
         def report(text: str) -> None:
-            status.update(console.render_str(text))
+            status.update(aside.render_str(text))
 
         yield report
 
@@ -68,10 +70,10 @@ def progress_lines() -> Iterator[Callable[[str], None]]:
 @contextmanager
 def campaign_bar() -> Iterator[Callable[[Progress], None]]:
     """Give a function that shows how far a campaign is: a bar on a terminal, a line now and then otherwise."""
-    if not console.is_terminal:
+    if not aside.is_terminal:
         from passiflex.chunks.run_chunks import sparsely
 
-        yield sparsely(lambda p: console.print(f"{p.done} of {p.total} samples, {_words(p)}"))
+        yield sparsely(lambda p: aside.print(f"{p.done} of {p.total} samples, {_words(p)}"))
         return
     import rich.progress as parts
 
@@ -79,7 +81,7 @@ def campaign_bar() -> Iterator[Callable[[Progress], None]]:
         parts.BarColumn(), parts.MofNCompleteColumn(), parts.TextColumn("{task.description}", markup=False),
         parts.TimeElapsedColumn(),
     )  # fmt: skip
-    with parts.Progress(*columns, console=console) as bar:
+    with parts.Progress(*columns, console=aside) as bar:
         task = bar.add_task("compiling and starting", total=None)
 
         def show(progress: Progress) -> None:

@@ -82,4 +82,8 @@ class Recommendation:
             dict(self.entry), sort_keys=False, allow_unicode=True, default_flow_style=None, width=110
         )
         ratios = ", ".join(f"{v:.2g}" for v in self.inertia_ratio)
-        return f"# K_e = K: the law needs no τ_e; B_e is B times {ratios}\n{text}"
+        return (
+            f"# K_e = K: the law needs no τ_e; B_e is B times {ratios}\n"
+            "# each section stands for the one of its name in the scenario, whatever else is there stays\n"
+            f"{text}"
+        )
