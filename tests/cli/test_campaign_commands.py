@@ -107,7 +107,9 @@ def test_what_replay_refuses(shell: Shell, small: Path, tmp_path: Path) -> None:
     for sample in (2, -1):
         result = shell("replay", out, "--sample", sample)
         assert result.status == 2
-        assert f"passiflex: samples of campaign 'small'; got [{sample}]; needs " in result.err.splitlines()[-1]
+        assert (
+            f"passiflex: samples of campaign 'small'; got [{sample}]; needs " in result.err.splitlines()[-1]
+        )
     empty = shell("replay", tmp_path, "--sample", 0)
     assert empty.status == 2
     assert empty.err.endswith(f"\npassiflex: {tmp_path} holds no campaign; got no manifest.json\n")

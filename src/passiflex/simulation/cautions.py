@@ -8,6 +8,7 @@ from passiflex.problems.problem import Problem
 from passiflex.simulation.book_cautions import book_cautions
 from passiflex.simulation.friction_cautions import much_compensation
 from passiflex.simulation.jump_cautions import far_jumps, racing
+from passiflex.simulation.reach_cautions import out_of_reach
 from passiflex.simulation.stability_cautions import stability_cautions
 from passiflex.simulation.start_cautions import singular_start, swallowed_joints
 from passiflex.simulation.turn_cautions import far_turns, large_moments
@@ -18,6 +19,7 @@ CAUTIONS: tuple[Callable[[Problem], tuple[str, ...]], ...] = (
     swallowed_joints,
     far_jumps,
     racing,
+    out_of_reach,
     far_turns,
     large_moments,
     much_compensation,
