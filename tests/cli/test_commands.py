@@ -270,6 +270,32 @@ def test_reproduce_hands_over_what_it_was_told(
     assert calls[1] == ((), Path("results"))
 
 
+# keys
+
+
+def test_keys_are_those_of_every_section(shell: Shell) -> None:
+    """What is written in a file of its own kind is in the table of its place."""
+    for place, words in {
+        "": ["robot", "posture", "duration", "environment"],
+        "control": ["rate", "task_rate", "lost"],
+        "control.lost": ["at", "periods"],
+        "control.fallback.stiffness": ["translation", "matrix"],
+        "environment": ["plane:", "load:", "person:"],
+        "environment.plane": ["point", "normal", "stiffness"],
+        "reference.circle": ["radius", "period"],
+    }.items():
+        result = shell("keys", *[place] * bool(place))
+        assert (result.status, result.err) == (0, "")
+        assert all(word in result.out for word in words), (place, result.out)
+
+
+def test_a_place_that_there_is_not_is_told_with_those_that_there_are(shell: Shell) -> None:
+    result = shell("keys", "control.falback")
+    assert (result.status, result.out) == (2, "")
+    assert result.err.startswith("passiflex: unknown section of control; got 'falback'")
+    assert "try 'fallback'" in result.err
+
+
 # robots, help, wrong use
 
 

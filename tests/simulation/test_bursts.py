@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import passiflex as pf
-from passiflex.errors import PassiflexError
+from passiflex.errors import PassiflexError, ScenarioError
 from passiflex.passivity import audit
 from passiflex.simulation import parse_scenario, resolve
 from passiflex.simulation.batch import simulate_in_lane
@@ -55,3 +55,10 @@ def test_a_scenario_with_bursts_is_written_whole() -> None:
 def test_a_burst_that_is_none_is_refused(burst: dict[str, float], said: str) -> None:
     with pytest.raises(PassiflexError, match=said):
         world(control={"lost": [burst]})
+
+
+def test_a_burst_after_the_end_is_refused() -> None:
+    with pytest.raises(
+        ScenarioError, match=r"control.lost\[1\].at: needs to be earlier than the end, 0.4 s; got 3 s"
+    ):
+        world(control={"lost": [*BURSTS[:1], {"at": 3, "periods": 2}]}, duration=0.4)

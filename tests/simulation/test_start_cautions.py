@@ -10,7 +10,7 @@ import pytest
 from passiflex.errors import ScenarioError, ValueRangeError
 from passiflex.robots.frames import world_frames
 from passiflex.simulation import resolve
-from passiflex.simulation.start_cautions import swallowed_joints
+from passiflex.simulation.start_cautions import heavy_loads, swallowed_joints
 from worlds import world
 
 
@@ -73,3 +73,23 @@ def test_smooth_friction_uses_nothing_of_what_sticks() -> None:
         ScenarioError, match=r"motors.static_friction: friction that is smooth does not use it"
     ):
         world(motors={"coulomb_friction": 1, "static_friction": 2})
+
+
+def test_a_load_that_no_motor_holds_is_said() -> None:
+    """By hand: the weight at the end of two links, and their own, about the first joint, which bears 50 N m or less."""
+    problem = resolve(world())
+    robot = problem.law.robot
+    hand = world_frames(robot.arm.chain, problem.q[None]).position[0, -1]
+    lever = float(np.hypot(hand[0], hand[1]))
+    limit = float(robot.torque_limit[0])
+
+    def said(mass: float) -> tuple[str, ...]:
+        load = {"kind": "load", "mass": mass, "from": 0.1, "to": 0.3}
+        return heavy_loads(resolve(world(environment=[load])))
+
+    assert said(0.01) == ()
+    (line,) = said(3 * limit / (9.81 * lever))
+    assert line.startswith("to hold load, ")
+    assert "a real arm sinks" in line
+    person = {"kind": "person", "mass": 500, "from": 0.1, "to": 0.3}
+    assert heavy_loads(resolve(world(environment=[person]))) == ()

@@ -105,7 +105,7 @@ def mistakes(forces: Any) -> str:
         ("t\n0\n", "has a column t only; needs fx,fy,fz or mx,my,mz beside it"),
         ("fx,fy,fz\n0,0,0\n", "has no column t, the time in s; add it"),
         ("t,fx,fy\n0,1,2\n", "has fx, fy without fz; add what is missing"),
-        ("time,fx,fy,fz\n0,1,2,3\n", "unknown column 'time'; one of 't', 'fx', 'fy', 'fz', 'mx', 'my', 'mz'"),
+        ("time,fx,fy,fz\n0,1,2,3\n", "unknown column 'time'; if it is the time in s, call it t"),
         ("t [s],fx,fy,fz\n0,1,2,3\n", "unknown column 't [s]'; try 't': columns are in SI units, without one"),
         ("t,fx,fy,fz,a\n0,1,2,3,4\n", "unknown column 'a'; known are t, fx,fy,fz, mx,my,mz"),
         ("t,fx,fy,fz\n0,1,2,3\n0,1,1,1\n", "line 3, column t: the time repeats, 0 s after 0 s; sort the rows by t, each instant once"),

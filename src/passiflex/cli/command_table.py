@@ -29,6 +29,7 @@ GROUPS = {
     "run": (
         Command("simulate", _ONE + "simulate", "run a scenario file"),
         Command("reproduce", _ONE + "reproduce", "make the paper's figures again, or a study"),
+        Command("keys", _ONE + "keys", "list what may be written in a scenario file"),
         Command(
             "robots", _ONE + "robots", "list the robots that are here, and where their numbers come from"
         ),

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import cyclopts
+import numpy as np
 
 from passiflex.cli.terminal import console, progress_lines, timed
 
@@ -152,6 +153,30 @@ def robots() -> int:
     return 0
 
 
+def keys(
+    place: Annotated[
+        str, cyclopts.Parameter(help="as control.fallback or environment.plane; the file itself if left out")
+    ] = "",
+    /,
+) -> int:
+    """List what may be written at a place of a scenario file: keys, with their units, defaults and meanings."""
+    from rich.table import Table
+
+    from passiflex.scenarios.keys import keys_of, sections_at
+
+    for name, section in sections_at(place).items():
+        about = (section.__doc__ or "").partition("\n")[0]
+        table = Table(title=f"{name}: {about}" if name else about, title_justify="left", expand=True)
+        table.add_column("key", no_wrap=True)
+        table.add_column("write", ratio=2)
+        table.add_column("default", no_wrap=True)
+        table.add_column("meaning", ratio=3)
+        for row in keys_of(section):
+            table.add_row(*row)
+        console.print(table)
+    return 0
+
+
 def _wrong_books(run: Run, result: Audit) -> str:
     """Return by how much the books of the law are wrong, and what they do not know."""
     from passiflex.problems.unbooked import NOTHING
@@ -170,7 +195,7 @@ def _print_control(run: Run) -> None:
     noted = float(run["fallback_time"]) if "fallback_time" in run.data else math.inf
     if latched.any() or math.isfinite(noted):
         fell = noted if math.isfinite(noted) else run.time[latched.argmax()]
-        console.print(f"the law fell back at {fell:.4g} s and held the pose it was in")
+        console.print(f"the law fell back at {fell:.4g} s and held the pose it was in{_overdrawn(run)}")
     if run["faults"][-1] > 0:
         console.print(f"{run['faults'][-1]:.0f} measurements were not finite, and changed nothing")
     bound = float(run["measurement_bound"][-1]) if run.has_tank and "measurement_bound" in run.data else 0.0
@@ -179,6 +204,12 @@ def _print_control(run: Run) -> None:
             f"errors of the sensors: the tank may claim up to {bound:.3g} J too much by the end, "
             f"{bound / run.time[-1]:.2g} W on average; nothing was granted on it"
         )
+
+
+def _overdrawn(run: Run) -> str:
+    """Return how much less than nothing the tank of a run ever had."""
+    least = float(np.nanmin(run["tank_energy"])) if run.has_tank else 0.0
+    return f"; its tank was overdrawn by {-least:.3g} J at most" if least < 0 else ""
 
 
 def _refuse_target(scenario: Path, out: Path) -> None:

@@ -53,7 +53,7 @@ def require_distinct(parts: Sequence[Layout]) -> None:
     """
     names = Counter(f.name for layout in parts for f in layout.kept)
     if twice := [name for name, count in names.items() if count > 1]:
-        needs = "another name of the class, element or field that was brought"
+        needs = "another name of what was brought: an entry of environment, a class, a field"
         raise ValueRangeError("a run has two signals of one name", got=", ".join(twice), needs=needs)
 
 

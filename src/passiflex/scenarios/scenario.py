@@ -270,6 +270,15 @@ class Scenario(Section):
             raise Mistakes(*late)
         return entries
 
+    @model_validator(mode="after")
+    def _lost_within_the_run(self) -> Self:
+        bursts = self.control.lost if self.control else ()
+        needs = f"needs to be earlier than the end, {self.duration:g} s"
+        late = [(i, burst.at) for i, burst in enumerate(bursts) if not burst.at < self.duration]
+        if late:
+            raise Mistakes(*((("control", "lost", i, "at"), f"{needs}; got {t:g} s") for i, t in late))
+        return self
+
     @field_validator("output_interval")
     @classmethod
     def _whole_samples(cls, interval: float, info: ValidationInfo) -> float:

@@ -10,13 +10,14 @@ from passiflex.simulation.friction_cautions import much_compensation
 from passiflex.simulation.jump_cautions import far_jumps, racing
 from passiflex.simulation.reach_cautions import out_of_reach
 from passiflex.simulation.stability_cautions import stability_cautions
-from passiflex.simulation.start_cautions import singular_start, swallowed_joints
+from passiflex.simulation.start_cautions import heavy_loads, singular_start, swallowed_joints
 from passiflex.simulation.turn_cautions import far_turns, large_moments
 
 CAUTIONS: tuple[Callable[[Problem], tuple[str, ...]], ...] = (
     stability_cautions,
     singular_start,
     swallowed_joints,
+    heavy_loads,
     far_jumps,
     racing,
     out_of_reach,

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from passiflex.control.posture import lost_directions, posture
+from passiflex.elements.held import Held
 from passiflex.elements.surface import Surface
 from passiflex.problems.problem import Problem
 from passiflex.robots.frames import world_frames
@@ -45,6 +46,26 @@ def swallowed_joints(problem: Problem) -> tuple[str, ...]:
             told.append(
                 f"{which} within {element.label} at the start: the hand alone touches what is around it, and nothing "
                 "keeps the arm out; try a place or a size that leaves the arm free"
+            )
+    return tuple(told)
+
+
+def heavy_loads(problem: Problem) -> tuple[str, ...]:
+    """Return a line for each load whose weight, with the arm's own, is more than a motor holds where the arm starts."""
+    robot = problem.law.robot
+    at = posture(robot, problem.q, robot.layout.unpack(problem.model))
+    told = []
+    for element in problem.elements:
+        if not isinstance(element, Held) or element.anchored:
+            continue
+        mass = float(np.asarray(element.values["mass"]))
+        force = mass * np.asarray(element.values["weight"])
+        needed = np.abs(at.gravity_torque - at.jacobian[:3].T @ force)
+        joint = int(np.argmax(needed / robot.torque_limit))
+        if needed[joint] > robot.torque_limit[joint]:
+            told.append(
+                f"to hold {element.label}, {mass:.3g} kg, where the arm starts, motor {joint + 1} needs "
+                f"{needed[joint]:.3g} N m and has {robot.torque_limit[joint]:.3g}: a real arm sinks"
             )
     return tuple(told)
 

@@ -35,6 +35,8 @@ def timed_table(text: str, known: Collection[str], example: str) -> NumberTable:
                 raise ValueError(
                     f"unknown column {name!r}; try {bare!r}: columns are in SI units, without one"
                 )
+            if "t" not in table.names and re.match(r"t\b|t_|time|stamp|sec", name, re.IGNORECASE):
+                raise ValueError(f"unknown column {name!r}; if it is the time in s, call it t")
             hint = suggested(name, known) if len(name) > 1 else f"known are {example}"
             raise ValueError(f"unknown column {name!r}; {hint}")
     if "t" not in table.names:
