@@ -87,7 +87,7 @@ def test_the_commands_are_listed_by_what_one_wants(shell: Shell, arguments: list
     assert list(groups) == ["run:", "your arm:", "judge:", "look:", "many robots:", "for example:"]
     listed = [[line.split()[0] for line in lines] for lines in groups.values()][:-1]
     assert listed == [
-        ["simulate", "reproduce", "robots"],
+        ["simulate", "reproduce", "keys", "robots"],
         ["robot", "robot", "card"],
         ["audit", "limits", "recommend"],
         ["show", "plot", "export", "export-model"],

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import cyclopts
-import numpy as np
 
 from passiflex.cli.terminal import console, progress_lines, timed
 
@@ -208,7 +207,7 @@ def _print_control(run: Run) -> None:
 
 def _overdrawn(run: Run) -> str:
     """Return how much less than nothing the tank of a run ever had."""
-    least = float(np.nanmin(run["tank_energy"])) if run.has_tank else 0.0
+    least = float(run["tank_energy"].min()) if run.has_tank else 0.0
     return f"; its tank was overdrawn by {-least:.3g} J at most" if least < 0 else ""
 
 
