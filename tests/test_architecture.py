@@ -27,6 +27,7 @@ ROOMS = (
     "runs",
     "engines",
     "simulation",
+    "onboard",
     "passivity",
     "metrics",
     "limits",

@@ -6,9 +6,9 @@
     print(pf.audit(run).verdict)
 
 The rooms, in the order in which they may import each other: `texts`, `robots`, `phs`, `control`, `sampled`, `elements`,
-`native`; `scenarios`, `loops`, `problems`, `stability`, `runs`, `engines`, `simulation`; `passivity`, `metrics`,
-`limits`, `cards`, `chunks`, `campaigns`; then what looks at their results: `diagrams`, `plotting`, `reports`,
-`exports`; then `studies`, `cli`.
+`native`; `scenarios`, `loops`, `problems`, `stability`, `runs`, `engines`, `simulation`, `onboard`; `passivity`,
+`metrics`, `limits`, `cards`, `chunks`, `campaigns`; then what looks at their results: `diagrams`, `plotting`,
+`reports`, `exports`; then `studies`, `cli`.
 """
 
 from __future__ import annotations
@@ -29,6 +29,10 @@ if TYPE_CHECKING:
     from passiflex.limits import limit_map as limit_map
     from passiflex.limits import recommend as recommend
     from passiflex.limits import recommend_for as recommend_for
+    from passiflex.onboard import Controller as Controller
+    from passiflex.onboard import Sensed as Sensed
+    from passiflex.onboard import Setpoint as Setpoint
+    from passiflex.onboard import WatchSettings as WatchSettings
     from passiflex.passivity import Audit as Audit
     from passiflex.passivity import audit as audit
     from passiflex.phs import PortHamiltonianSystem as PortHamiltonianSystem
@@ -46,12 +50,16 @@ if TYPE_CHECKING:
 
 _ROOMS = {
     "Audit": "passivity",
+    "Controller": "onboard",
     "FlexibleJointRobot": "robots",
     "ImpedanceLaw": "control",
     "PortHamiltonianSystem": "phs",
     "RigidImpedanceLaw": "control",
     "Run": "simulation",
     "Scenario": "simulation",
+    "Sensed": "onboard",
+    "Setpoint": "onboard",
+    "WatchSettings": "onboard",
     "audit": "passivity",
     "card": "cards",
     "catalogue": "robots",

@@ -22,7 +22,8 @@ from passiflex.sampled.controller import SampledController
 from passiflex.sampled.measurement_bound import BEND
 from passiflex.sampled.motors import UNLIMITED_TORQUE
 from passiflex.sampled.readings import Lateness, Readings
-from passiflex.sampled.sensors import UNFILTERED
+from passiflex.sampled.said import SAYABLE, SaysLess
+from passiflex.sampled.sensors import UNFILTERED, AbstractSensorEffect
 from passiflex.scenarios.action_settings import Actions
 from passiflex.scenarios.control_settings import Control
 from passiflex.scenarios.motor_settings import MotorSettings
@@ -121,7 +122,16 @@ def sampled_parts(
         "lateness": sensors.lateness,
         "gain_changes": _gain_changes(scenario, gains),
         "feedforward": feedforward_of(scenario, robot),
+        "effects": _effects(sensors, model),
     }
+
+
+def _effects(sensors: SensorSettings, model: dict[str, Array]) -> tuple[AbstractSensorEffect, ...]:
+    """Return what of the readings is completed."""
+    if len(sensors.says) == len(SAYABLE):
+        return ()
+    K = tuple(model["joint_stiffness"].tolist())
+    return (SaysLess(sensors.says, K, _pole(sensors.velocity_filter)),)
 
 
 def _pole(frequency: float) -> float:

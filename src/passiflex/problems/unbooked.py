@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from passiflex.problems.problem import Problem, SampledProblem
+from passiflex.sampled.said import SaysLess
 
 UNKNOWN = "model error and noise"
 """Of a run that does not say what was in it."""
@@ -30,6 +31,8 @@ def unbooked(problem: Problem) -> str:
     noise = problem.noise
     if noise is not None and (noise.moves or (noise.variance > 0 and not own)):
         causes.append("noise")
+    if s is not None and any(isinstance(e, SaysLess) and e.guesses for e in s.effects):
+        causes.append("joint torques that nobody measures")
     causes += [e.unknown for e in problem.elements if e.acts and e.unknown]
     return listed(causes) or NOTHING
 

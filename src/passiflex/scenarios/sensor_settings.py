@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from pydantic import Field
+from pydantic import Field, field_validator
 
 from passiflex.scenarios.control_settings import ENDLESS, Frequency, PerJoint, Vector
 from passiflex.scenarios.spans import Instant
@@ -40,6 +40,10 @@ class SensorSettings(Section):
     )
     link_resolution: Angle = Field(default=0.0, description="resolution of q, rad; 0 for none")
     motor_resolution: Angle = Field(default=0.0, description="resolution of θ, rad; 0 for none")
+    says: tuple[Literal["q", "theta", "dq", "dtheta", "tau_a"], ...] = Field(
+        default=("q", "theta", "dq", "dtheta", "tau_a"),
+        description="what the robot says of its joints, q or theta at least; the law is told what follows from it",
+    )
     velocity: Literal["true", "differences"] = Field(
         default="true", description="q̇ and θ̇: the truth, or differences of the position readings"
     )
@@ -59,6 +63,13 @@ class SensorSettings(Section):
     motor_delay: Instant = Field(default=0.0, description="the same of θ and θ̇, s")
     torque_delay: Instant = Field(default=0.0, description="the same of τ_a, s")
     wrench_delay: Instant = Field(default=0.0, description="the same of the wrench sensor, s")
+
+    @field_validator("says")
+    @classmethod
+    def _where_it_is(cls, says: tuple[str, ...]) -> tuple[str, ...]:
+        if not {"q", "theta"} & set(says):
+            raise ValueError("needs q, theta, or both: a law must know where the joints are")
+        return tuple(name for name in ("q", "theta", "dq", "dtheta", "tau_a") if name in says)
 
     @property
     def lateness(self) -> Lateness:

@@ -1,0 +1,53 @@
+"""How a controller watches a robot, in numbers."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+
+import numpy as np
+
+from passiflex.errors import ValueRangeError
+
+
+@dataclass(frozen=True)
+class WatchSettings:
+    """Times [s] after which something is done about setpoints and readings.
+
+    Attributes
+    ----------
+    stale_after: Without a setpoint, the reference stands still.
+    soften_after: Without a setpoint, the stiffness goes.
+    frozen_after: Of readings that are equal to the last bit, it goes; inf for an ideal robot, which may stand so.
+    silent_after: Without a finite reading, the stiffness goes, and the torque to what carries the arm.
+    soften: In which it goes.
+    soft_start: In which it comes; 0 for at once.
+
+    Raises
+    ------
+    ValueRangeError
+        For a time that is negative or no number.
+    """
+
+    stale_after: float = 0.1
+    soften_after: float = 1.0
+    frozen_after: float = 0.5
+    silent_after: float = 0.02
+    soften: float = 1.0
+    soft_start: float = 1.0
+
+    def __post_init__(self) -> None:
+        """Refuse times that are none."""
+        for name, value in asdict(self).items():
+            if not value >= 0:
+                raise ValueRangeError(f"{name} of the watch", got=value, needs="a time of 0 s or more")
+
+    @classmethod
+    def off(cls) -> WatchSettings:
+        """Return a watch that never acts: for a plant that is simulated."""
+        never = np.inf
+        return cls(never, never, never, never, 0.0, 0.0)
+
+    @property
+    def numbers(self) -> dict[str, float]:
+        """Return the values of `watch_layout`."""
+        return {name: min(value, 1e9) for name, value in asdict(self).items()}
