@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from passiflex.cards import card as card
     from passiflex.control import ImpedanceLaw as ImpedanceLaw
     from passiflex.control import RigidImpedanceLaw as RigidImpedanceLaw
+    from passiflex.exports import export_law as export_law
     from passiflex.limits import check as check
     from passiflex.limits import limit_map as limit_map
     from passiflex.limits import recommend as recommend
@@ -64,6 +65,7 @@ _ROOMS = {
     "card": "cards",
     "catalogue": "robots",
     "check": "limits",
+    "export_law": "exports",
     "limit_map": "limits",
     "load_campaign": "campaigns",
     "load_scenario": "simulation",

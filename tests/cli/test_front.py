@@ -84,13 +84,22 @@ def test_the_commands_are_listed_by_what_one_wants(shell: Shell, arguments: list
     assert (status, err) == (0, "")
     parts = out.split("\n\n")
     groups = {part.splitlines()[0]: part.splitlines()[1:] for part in parts[2:-1]}
-    assert list(groups) == ["run:", "your arm:", "judge:", "look:", "many robots:", "for example:"]
+    assert list(groups) == [
+        "run:",
+        "your arm:",
+        "judge:",
+        "look:",
+        "on a robot:",
+        "many robots:",
+        "for example:",
+    ]
     listed = [[line.split()[0] for line in lines] for lines in groups.values()][:-1]
     assert listed == [
         ["simulate", "reproduce", "keys", "robots"],
         ["robot", "robot", "card"],
         ["audit", "limits", "recommend"],
         ["show", "plot", "export", "export-model"],
+        ["export-law"],
         ["campaign", "replay", "search"],
     ]
     assert len(groups["for example:"]) == 3

@@ -176,7 +176,7 @@ def test_what_a_setpoint_leaves_out_stays() -> None:
         arm.said(*ALL), Setpoint(position=[0.6, 0, 0.6], stiffness=[100, 100, 100], wrench=[1, 0, 0, 0, 0, 0])
     )
     controller.step(arm.said(*ALL), Setpoint(damping=[50, 50, 50]))
-    now = controller._asked
+    now = controller.asked
     np.testing.assert_array_equal(now["position"], [0.6, 0, 0.6])
     np.testing.assert_array_equal(now["stiffness"], 100 * np.eye(3))
     np.testing.assert_array_equal(now["damping"], 50 * np.eye(3))

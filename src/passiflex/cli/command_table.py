@@ -50,6 +50,9 @@ GROUPS = {
         Command("export", _SEEN + "export", "write a run for Rerun, Foxglove, PlotJuggler, or as a table"),
         Command("export-model", _SEEN + "export_model", "write a robot as a model for MuJoCo"),
     ),
+    "on a robot": (
+        Command("export-law", _SEEN + "export_law", "write the law of a scenario as C, with its own test"),
+    ),
     "many robots": (
         Command("campaign", _MANY + "campaign", "run a scenario for thousands of robots"),
         Command("replay", _MANY + "replay", "make the full run of one of them"),

@@ -78,7 +78,8 @@ class Controller:
         self.torque.flags.writeable = False
         self._heard: list[tuple[int, Array]] = []
         self._elapsed = self._said[self.law.said.slices["elapsed"]]
-        self._asked = self.law.setpoint.unpack(self._setpoint)
+        self.asked = self.law.setpoint.unpack(self._setpoint)
+        self.inputs: dict[str, Array] = {"said": self._said, "numbers": self._numbers}
         self._fresh, self._run = (self._setpoint[self.law.setpoint.slices[name]] for name in ("fresh", "run"))
         self._last: Setpoint | None = None
         self.recorder: Recorder | None = None
@@ -235,7 +236,7 @@ class Controller:
 
     def _ask(self, setpoint: Setpoint) -> None:
         """Write a setpoint, of which what is left out stays."""
-        for name, into in self._asked.items():
+        for name, into in self.asked.items():
             value = getattr(setpoint, name, None)
             if value is None:
                 if name in ("velocity", "acceleration", "wrench"):
