@@ -30,7 +30,9 @@ if TYPE_CHECKING:
     from passiflex.limits import limit_map as limit_map
     from passiflex.limits import recommend as recommend
     from passiflex.limits import recommend_for as recommend_for
+    from passiflex.onboard import ApproachSettings as ApproachSettings
     from passiflex.onboard import Controller as Controller
+    from passiflex.onboard import Guard as Guard
     from passiflex.onboard import Sensed as Sensed
     from passiflex.onboard import Setpoint as Setpoint
     from passiflex.onboard import WatchSettings as WatchSettings
@@ -50,9 +52,11 @@ if TYPE_CHECKING:
     from passiflex.studies import shipped_scenario as shipped_scenario
 
 _ROOMS = {
+    "ApproachSettings": "onboard",
     "Audit": "passivity",
     "Controller": "onboard",
     "FlexibleJointRobot": "robots",
+    "Guard": "onboard",
     "ImpedanceLaw": "control",
     "PortHamiltonianSystem": "phs",
     "RigidImpedanceLaw": "control",

@@ -1,6 +1,8 @@
 """The law on a robot: one controller, stepped from Python or exported as C."""
 
 from passiflex.onboard.controller import Controller as Controller
+from passiflex.onboard.guard import Guard as Guard
 from passiflex.onboard.sensed import Sensed as Sensed
 from passiflex.onboard.setpoint import Setpoint as Setpoint
+from passiflex.onboard.settings import ApproachSettings as ApproachSettings
 from passiflex.onboard.settings import WatchSettings as WatchSettings

@@ -17,7 +17,7 @@ from passiflex.onboard.robot_law import RobotLaw
 from passiflex.onboard.robot_numbers import robot_numbers
 from passiflex.onboard.sensed import Sensed
 from passiflex.onboard.setpoint import Setpoint
-from passiflex.onboard.settings import WatchSettings
+from passiflex.onboard.settings import ApproachSettings, WatchSettings
 from passiflex.sampled.said import SAYABLE, SaysLess
 from passiflex.scenarios.scenario import Scenario
 from passiflex.scenarios.scenario_file import load_scenario
@@ -43,6 +43,7 @@ class Controller:
     ----------
     scenario: Or its file; it has a `control` section. What is around the robot in it, and its reference, are left out.
     watch: What is done about setpoints and readings that stay away.
+    approach: How a setpoint that jumps is gone over to; at once if it is left out, as far as the tank pays.
     weight_in_readings: Whether torque and motor positions contain the weight although the law does not carry it; left
         out, they do if the robot carries it (`gravity: robot`), as on real arms.
 
@@ -58,12 +59,13 @@ class Controller:
         self,
         scenario: Scenario | str | Path,
         watch: WatchSettings | None = None,
+        approach: ApproachSettings | None = None,
         *,
         weight_in_readings: bool | None = None,
     ):
         read = scenario if isinstance(scenario, Scenario) else load_scenario(scenario)
         self.scenario = self._laid_out = alone(read)
-        self.watch = watch or WatchSettings()
+        self.watch, self.approach = watch or WatchSettings(), approach or ApproachSettings()
         self._weight_in_readings = weight_in_readings
         self.problem = laid_out(self.scenario)
         own = tuple(e for e in self.problem.effects if not isinstance(e, SaysLess))
@@ -218,7 +220,12 @@ class Controller:
     def _begun(self, sensed: Sensed, says: dict[str, float], level: float) -> Array:
         """Begin with the readings at a level [J] of the tank, and return where the links are (n,)."""
         self._numbers[:] = robot_numbers(
-            self.law, self.problem, says, self.watch, weight_in_readings=self._weight_in_readings
+            self.law,
+            self.problem,
+            says,
+            self.watch,
+            self.approach,
+            weight_in_readings=self._weight_in_readings,
         )
         for i, into in self._heard:
             value = np.asarray(sensed[i], dtype=float)

@@ -19,8 +19,9 @@ from numpy.typing import NDArray
 from passiflex.layout import Field, Layout, Signal
 from passiflex.loops.period_law import PeriodLaw
 from passiflex.loops.period_row import PeriodRow
+from passiflex.onboard.approach import Near, approach_layout, approach_state, approached
 from passiflex.onboard.readings import SAID, completed, robot_layout, said_layout
-from passiflex.onboard.watch import AT_ONCE, watch_layout, watch_state, watched
+from passiflex.onboard.watch import AT_ONCE, Watched, watch_layout, watch_state, watched
 from passiflex.parts import Parts
 from passiflex.robots.flexible import FlexibleJointRobot
 from passiflex.sampled.controller import LARGEST_READING, SampledController
@@ -75,7 +76,7 @@ class RobotLaw:
     @cached_property
     def parameters(self) -> Parts:
         """Return the layouts of its numbers."""
-        own = {"robot": robot_layout(self.robot.n), "watch": watch_layout()}
+        own = {"robot": robot_layout(self.robot.n), "watch": watch_layout(), "approach": approach_layout()}
         return Parts({**self.period.parameters.layouts, **own})
 
     @cached_property
@@ -86,7 +87,8 @@ class RobotLaw:
     @cached_property
     def _own(self) -> Layout:
         """Return what is remembered around the period."""
-        return said_state(self.robot.n) + watch_state(self.said.size - 1)
+        around = said_state(self.robot.n) + watch_state(self.said.size - 1)
+        return around + approach_state(self.controller.law.task.size)
 
     @cached_property
     def signals(self) -> Layout:
@@ -126,7 +128,13 @@ class RobotLaw:
             "level": level,
             "command": command,
         }
-        own = {f.name: cs.SX.zeros(*f.shape) for f in self._own} | {"scale": scale}
+        own = {f.name: cs.SX.zeros(*f.shape) for f in self._own} | {
+            "scale": scale,
+            "near_position": home.position,
+            "near_rotation": home.rotation,
+            "near_stiffness": gains.stiffness,
+            "near_damping": gains.damping,
+        }
         memory = cs.vertcat(self._first(at), self._own.stack(own))
         asked = {f.name: cs.SX.zeros(*f.shape) for f in self.setpoint} | {
             "position": home.position,
@@ -185,12 +193,13 @@ class RobotLaw:
         begun = cs.vertcat(memory[: own - robot.n], applied)
         at = SimpleNamespace(**{**vars(s), "applied_torque": applied})
         measured = full.measured._replace(q=cs.if_else(ok > 0, full.measured.q, math.nan))
-        result = self.period.step(measured, begun, at, self._told(w, passed, watch), views)
+        near = approached(w, watch.age, passed, s, views["approach"])
+        result = self.period.step(measured, begun, at, self._told(near, w.wrench, passed, watch), views)
         torque = cs.if_else(ok > 0, result.applied, self._faded(watch.scale, at, views, passed))
         kept = cs.if_else(ok > 0, full.state, memory[own : own + full.state.numel()])
         senses = self.period.sensors.state.size
         read = cs.if_else(ok > 0, result.after[:senses], memory[:senses])
-        after = cs.vertcat(read, result.after[senses : own - robot.n], torque, kept, watch.state)
+        after = cs.vertcat(read, result.after[senses : own - robot.n], torque, kept, watch.state, near.state)
         return (said, setpoint, memory, p), self._signals(result.signals, full, watch), after, torque
 
     def _says(self, g: Any) -> cs.SX:
@@ -200,7 +209,7 @@ class RobotLaw:
               for name in SAID)
         )  # fmt: skip
 
-    def _told(self, w: Any, elapsed: cs.SX, watch: Any) -> Any:
+    def _told(self, w: Near, wrench: cs.SX, elapsed: cs.SX, watch: Watched) -> Any:
         """Return the row of the period."""
         n = self.robot.n
         moves = cs.if_else(watch.fresh, 1, 0)
@@ -211,7 +220,7 @@ class RobotLaw:
             "desired_acceleration": moves * w.acceleration,
             "desired_stiffness": watch.scale * w.stiffness,
             "desired_damping": w.damping,
-            "feedforward": watch.scale * w.wrench,
+            "feedforward": watch.scale * wrench,
             "torque_noise": cs.SX.zeros(n),
             "link_noise": cs.SX.zeros(n),
             "motor_noise": cs.SX.zeros(n),

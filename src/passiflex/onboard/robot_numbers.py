@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from passiflex.onboard.robot_law import RobotLaw
-from passiflex.onboard.settings import WatchSettings
+from passiflex.onboard.settings import ApproachSettings, WatchSettings
 from passiflex.problems.problem import SampledProblem
 from passiflex.sampled.sensors import UNFILTERED
 
@@ -21,6 +21,7 @@ def robot_numbers(
     problem: SampledProblem,
     says: Mapping[str, float],
     watch: WatchSettings,
+    approach: ApproachSettings,
     *,
     weight_in_readings: bool | None,
 ) -> Array:
@@ -48,5 +49,5 @@ def robot_numbers(
     weighed = not problem.law.gravity.in_model if weight_in_readings is None else weight_in_readings
     weight = np.array(robot.arm.chain.gravity) if weighed else np.zeros(3)
     values["robot"] = {**says, "weight": weight, "velocity_pole": pole}
-    values["watch"] = watch.numbers
+    values["watch"], values["approach"] = watch.numbers, approach.numbers
     return law.parameters.pack(values)

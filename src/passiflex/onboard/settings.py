@@ -1,4 +1,4 @@
-"""How a controller watches a robot, in numbers."""
+"""How a controller watches a robot, and how it approaches what it is asked, in numbers."""
 
 from __future__ import annotations
 
@@ -50,4 +50,35 @@ class WatchSettings:
     @property
     def numbers(self) -> dict[str, float]:
         """Return the values of `watch_layout`."""
+        return {name: min(value, 1e9) for name, value in asdict(self).items()}
+
+
+@dataclass(frozen=True)
+class ApproachSettings:
+    """How what is asked for is approached.
+
+    Attributes
+    ----------
+    ramp: Time in which a setpoint is gone over to, pose and gains [s]; 0 for at once. Of messages at 10 Hz, 0.1 s.
+    speed, turn_rate: Largest of the reference [m/s, rad/s].
+
+    Raises
+    ------
+    ValueRangeError
+        For one that is negative or no number.
+    """
+
+    ramp: float = 0.0
+    speed: float = np.inf
+    turn_rate: float = np.inf
+
+    def __post_init__(self) -> None:
+        """Refuse numbers that are none."""
+        for name, value in asdict(self).items():
+            if not value >= 0:
+                raise ValueRangeError(f"{name} of the approach", got=value, needs="0 or more")
+
+    @property
+    def numbers(self) -> dict[str, float]:
+        """Return the values of `approach_layout`."""
         return {name: min(value, 1e9) for name, value in asdict(self).items()}

@@ -52,11 +52,13 @@ class Watched(NamedTuple):
     ----------
     scale: σ.
     fresh: 1 while the reference may move.
+    age: Of the setpoint [s].
     state: Flat.
     """
 
     scale: cs.SX
     fresh: cs.SX
+    age: cs.SX
     state: cs.SX
 
 
@@ -89,4 +91,4 @@ def watched(said: cs.SX, elapsed: cs.SX, ok: cs.SX, told: Any, s: Any, g: Any, s
             "last_said": cs.if_else(ok > 0, said, s.last_said),
         }
     )
-    return Watched(scale, age < g.stale_after, state)
+    return Watched(scale, age < g.stale_after, age, state)
