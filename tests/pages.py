@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import shlex
 import shutil
+import subprocess
 import sys
 import tomllib
 import webbrowser
@@ -168,6 +169,10 @@ def run_line(line: str, shell: Shell, stack: ExitStack) -> str:
             result = shell(*(_address(word, stack) for word in arguments))
             assert result.status == 0, result.out + result.err
             return result.out
+        case ["make", "-C", folder, target]:
+            done = subprocess.run(["make", "-C", folder, target], capture_output=True, text=True, check=False)
+            assert done.returncode == 0, done.stderr
+            return done.stdout
         case ["make", target]:
             assert target in targets(), f"no target of the Makefile: {target}"
         case ["pip", "install", package]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -19,43 +20,50 @@ WATCH = WatchSettings(frozen_after=np.inf, soft_start=0.0)
 
 
 @pytest.fixture(scope="module")
-def guard() -> Guard:
+def guard() -> Iterator[Guard]:
     controller = Controller(planar(motors={"torque_limit": "robot"}), WATCH, ApproachSettings(0.05, 0.5, 1.0))
     controller.start(ElasticArm("planar2r", START).said(*ALL))
-    return Guard(controller)
+    with Guard(controller) as guard:
+        yield guard
 
 
 def test_gains_that_pass_hold(guard: Guard) -> None:
     """A search: random ones of every rank and size, each with what stayed of those before."""
-    rng, problem = np.random.default_rng(5), guard.controller.problem
-    assert guard.trusted.stiffness_factor > 2
+    rng, problem, passed = np.random.default_rng(5), guard.controller.problem, 0
     now = {name: problem.law.layout.unpack(problem.gains)[name] for name in ("stiffness", "damping")}
-    for _ in range(150):
+    for _ in range(25):
         message = {}
-        for name in ("stiffness", "damping"):
+        for name in now:
             shape = rng.normal(size=(3, rng.integers(1, 4)))
             if rng.random() < 0.8:
                 message[name] = shape @ shape.T * 10 ** rng.uniform(-1, 5)
-        said = guard.send(**message)
-        assert not said.startswith("refused")
+        before = guard.counts.reduced
+        assert guard.send(**message) == ""
+        guard.wait()
         taken = guard.take()
         assert taken is not None
         now |= {name: v for name in now if (v := getattr(taken, name)) is not None}
-        found = judge(altered(problem, gains=now))
-        assert found.stable, (said, found.spectrum)
+        assert judge(altered(problem, gains=now)).stable
+        passed += bool(message) and guard.counts.reduced == before
+    assert 2 < passed < 23
 
 
-def test_more_than_is_trusted_is_scaled_and_said(guard: Guard) -> None:
-    most = guard.trusted.stiffness
-    said = guard.send(stiffness=4 * most, damping=[0.0, 0, 0])
-    assert said == (
-        "stiffness scaled to 0.25 of it: more is not trusted at this rate and posture; "
-        "damping raised by 2.5 ms of the stiffness, which the delay takes"
-    )
+def test_gains_that_do_not_hold_are_taken_in_part_and_said(guard: Guard) -> None:
+    own = guard.controller.problem.law.layout.unpack(guard.controller.problem.gains)
+    guard.send(stiffness=own["stiffness"], damping=own["damping"])
+    guard.wait()
+    guard.take()
+    guard.send(position=[0.5, 0, 0.5], stiffness=own["stiffness"], damping=60 * own["damping"])
+    first = guard.take()
+    assert first is not None
+    assert first.damping is None  # the pose does not wait
+    guard.wait()
+    assert guard.said.startswith("gains taken ")
+    assert "would tremble at" in guard.said
     taken = guard.take()
     assert taken is not None
-    np.testing.assert_allclose(taken.stiffness, most)
-    np.testing.assert_allclose(taken.damping, 2.5e-3 * most)
+    np.testing.assert_array_equal(taken.position, [0.5, 0, 0.5])
+    assert own["damping"][0, 0] < taken.damping[0, 0] < 60 * own["damping"][0, 0]
     assert guard.take() is None
 
 
@@ -75,17 +83,17 @@ def test_what_is_no_setpoint_is_refused_and_the_one_before_stays(
     guard: Guard, message: dict[str, Any], why: str
 ) -> None:
     guard.send(position=[0.5, 0, 0.5])
-    before = guard.refused
+    before = guard.counts.refused
     with pytest.raises(AssertionError, match=why):
         raise AssertionError(guard.send(**message))
-    assert guard.refused == before + 1
+    assert guard.counts.refused == before + 1
     taken = guard.take()
     assert taken is not None
     np.testing.assert_array_equal(taken.position, [0.5, 0, 0.5])
 
 
 def test_messages_come_from_other_threads(guard: Guard) -> None:
-    before = guard.received
+    before = guard.counts.received
 
     def policy() -> None:
         for i in range(200):
@@ -96,7 +104,7 @@ def test_messages_come_from_other_threads(guard: Guard) -> None:
         thread.start()
     for thread in threads:
         thread.join()
-    assert guard.received == before + 800
+    assert guard.counts.received == before + 800
     assert guard.take() is not None
 
 
@@ -148,6 +156,7 @@ def test_whatever_is_sent_the_reference_is_no_faster_than_it_may_be_and_the_tank
     controller = Controller(planar(motors={"torque_limit": "robot"}), WATCH, ApproachSettings(0.04, 0.5, 1.0))
     controller.start(arm.said(*ALL))
     guard = Guard(controller)
+    guard.wait()
     full, least, before = controller.report.level, np.inf, near(controller, "position").copy()
     for k in range(4000):
         if k % 20 == 0:
@@ -166,8 +175,8 @@ def test_whatever_is_sent_the_reference_is_no_faster_than_it_may_be_and_the_tank
         before = now.copy()
         least = min(least, full - arm.given)
     assert least > 0
-    assert guard.refused > 10
-    assert guard.reduced > 10
+    assert guard.counts.refused > 10
+    guard.close()
     assert not controller.report.latched
 
 
@@ -188,9 +197,12 @@ def test_what_is_well_is_followed_as_without_a_guard() -> None:
             if guard is None:
                 arm.move(controller.step(arm.said(*ALL), Setpoint(position=wished)))
             else:
-                assert k % 50 or guard.send(position=wished) == ""
+                if k % 50 == 0:
+                    assert guard.send(position=wished) == ""
                 arm.move(controller.step(arm.said(*ALL), guard.take()))
             way.append(arm.hand)
         hands.append(np.array(way))
+        if guard is not None:
+            guard.close()
     alone, guarded_way = hands
     assert np.abs(alone - guarded_way).max() < 0.05 * np.ptp(alone, axis=0).max()
