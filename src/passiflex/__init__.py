@@ -33,6 +33,8 @@ if TYPE_CHECKING:
     from passiflex.onboard import ApproachSettings as ApproachSettings
     from passiflex.onboard import Controller as Controller
     from passiflex.onboard import Guard as Guard
+    from passiflex.onboard import GuardClient as GuardClient
+    from passiflex.onboard import GuardServer as GuardServer
     from passiflex.onboard import Sensed as Sensed
     from passiflex.onboard import Setpoint as Setpoint
     from passiflex.onboard import WatchSettings as WatchSettings
@@ -57,6 +59,8 @@ _ROOMS = {
     "Controller": "onboard",
     "FlexibleJointRobot": "robots",
     "Guard": "onboard",
+    "GuardClient": "onboard",
+    "GuardServer": "onboard",
     "ImpedanceLaw": "control",
     "PortHamiltonianSystem": "phs",
     "RigidImpedanceLaw": "control",

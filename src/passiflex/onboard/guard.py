@@ -75,7 +75,7 @@ class Guard:
             self._closed = True
         self._pool.shutdown(cancel_futures=True)
 
-    def send(self, **message: Any) -> str:
+    def send(self, /, **message: Any) -> str:
         """Take a message, with entries as a `Setpoint` has them; return why it is refused, else nothing."""
         try:
             asked = self._checked(message)
