@@ -37,7 +37,9 @@ if TYPE_CHECKING:
     from passiflex.onboard import GuardServer as GuardServer
     from passiflex.onboard import Sensed as Sensed
     from passiflex.onboard import Setpoint as Setpoint
+    from passiflex.onboard import Twin as Twin
     from passiflex.onboard import WatchSettings as WatchSettings
+    from passiflex.onboard import run_on as run_on
     from passiflex.passivity import Audit as Audit
     from passiflex.passivity import audit as audit
     from passiflex.phs import PortHamiltonianSystem as PortHamiltonianSystem
@@ -68,6 +70,7 @@ _ROOMS = {
     "Scenario": "simulation",
     "Sensed": "onboard",
     "Setpoint": "onboard",
+    "Twin": "onboard",
     "WatchSettings": "onboard",
     "audit": "passivity",
     "card": "cards",
@@ -81,6 +84,7 @@ _ROOMS = {
     "recommend_for": "limits",
     "replay": "campaigns",
     "run_campaign": "campaigns",
+    "run_on": "onboard",
     "salvage": "simulation",
     "shipped_scenario": "studies",
     "setpoint_table": "simulation",

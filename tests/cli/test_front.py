@@ -99,7 +99,7 @@ def test_the_commands_are_listed_by_what_one_wants(shell: Shell, arguments: list
         ["robot", "robot", "card"],
         ["audit", "limits", "recommend"],
         ["show", "plot", "export", "export-model"],
-        ["export-law"],
+        ["run", "export-law"],
         ["campaign", "replay", "search"],
     ]
     assert len(groups["for example:"]) == 3

@@ -20,9 +20,16 @@ class Command(NamedTuple):
     line: str
 
 
-_MANY, _ONE, _LIMITS, _ROBOT, _SEEN = (
+_MANY, _ONE, _LIMITS, _ROBOT, _SEEN, _ON = (
     f"passiflex.cli.{module}:"
-    for module in ("campaign_commands", "commands", "limit_commands", "robot_commands", "view_commands")
+    for module in (
+        "campaign_commands",
+        "commands",
+        "limit_commands",
+        "robot_commands",
+        "view_commands",
+        "on_commands",
+    )
 )
 
 GROUPS = {
@@ -51,7 +58,8 @@ GROUPS = {
         Command("export-model", _SEEN + "export_model", "write a robot as a model for MuJoCo"),
     ),
     "on a robot": (
-        Command("export-law", _SEEN + "export_law", "write the law of a scenario as C, with its own test"),
+        Command("run", _ON + "run", "run a scenario on a robot, or on a twin of it, in real time"),
+        Command("export-law", _ON + "export_law", "write the law of a scenario as C, with its own test"),
     ),
     "many robots": (
         Command("campaign", _MANY + "campaign", "run a scenario for thousands of robots"),

@@ -1,4 +1,4 @@
-"""The commands that look at runs: show, plot, export, which read damaged files too; and those that write for others."""
+"""The commands that look at runs: show, plot, export, which read damaged files too; and export-model, for a robot."""
 
 from __future__ import annotations
 
@@ -131,27 +131,6 @@ def export_model(
         for line in cut:
             console.print(f"note: {line}")
         console.print(f"wrote {out}")
-    return 0
-
-
-def export_law(
-    scenario: Path,
-    /,
-    *,
-    out: Annotated[Path, cyclopts.Parameter(help="folder to write")],
-    says: Annotated[
-        str | None,
-        cyclopts.Parameter(
-            help="of q, theta, dq, dtheta, tau_a, F_e, applied; as 'q,dq,tau_a'; the scenario's own"
-        ),
-    ] = None,
-) -> int:
-    """Write the law of a scenario as C99: `make check` in the folder compares it with Python, step by step."""
-    from passiflex.exports.law_export import export_law as export
-
-    with timed():
-        folder = export(scenario, out, says and [word.strip() for word in says.split(",")])
-        console.print(f"wrote {folder}")
     return 0
 
 

@@ -83,7 +83,7 @@ class Controller:
         self.asked = self.law.setpoint.unpack(self._setpoint)
         self.inputs: dict[str, Array] = {"said": self._said, "numbers": self._numbers}
         self._fresh, self._run = (self._setpoint[self.law.setpoint.slices[name]] for name in ("fresh", "run"))
-        self._last: Setpoint | None = None
+        self.last: Setpoint | None = None
         self.recorder: Recorder | None = None
         self._judgement: Judgement | None = None
 
@@ -142,10 +142,10 @@ class Controller:
             raise SizeError("readings", got=str(error), needs=f"{self.problem.law.robot.n} joints") from error
         self._elapsed[0] = self.problem.period if elapsed is None else elapsed
         if setpoint is not None:
-            if setpoint is not self._last:
-                self._ask(setpoint)
+            if setpoint is not self.last:
+                self.ask(setpoint)
             self._fresh[0] = 1.0
-        elif self._last is not None:
+        elif self.last is not None:
             self._fresh[0] = 0.0
         self._step.call()
         if self.recorder is not None:
@@ -238,10 +238,10 @@ class Controller:
         memory, setpoint, measured = self._begin(self._said, level, self._numbers)
         self._memory[:], self._setpoint[:] = memory, setpoint
         self._signals[:] = 1.0
-        self._last = None
+        self.last = None
         return self.law.period.measurement.unpack(measured)["q"]
 
-    def _ask(self, setpoint: Setpoint) -> None:
+    def ask(self, setpoint: Setpoint) -> None:
         """Write a setpoint, of which what is left out stays."""
         for name, into in self.asked.items():
             value = getattr(setpoint, name, None)
@@ -252,4 +252,4 @@ class Controller:
             if value.shape != into.shape:
                 raise SizeError(f"{name} of a setpoint", got=value.shape, needs=f"shape {into.shape}")
             into[...] = value
-        self._last = setpoint
+        self.last = setpoint
