@@ -19,6 +19,8 @@ ROUND = 1e-6
 NEARLY = 1e-3
 """By how much a rotation may be none before it is refused; what is less is mended."""
 SIZES = (3, 6)
+STIFFEST = 1e9
+"""Largest entry of a gain [N/m, N s/m, N m/rad, N m s/rad]: what is more is a mistake."""
 EYE = np.eye(3)
 
 
@@ -83,18 +85,21 @@ def _rotation(value: Array | None) -> Array | None:
     """Return the nearest rotation of a matrix that almost is one, or that of a quaternion."""
     if value is None:
         return None
-    if value.shape == (4,):
+    if value.shape == (4,) and np.abs(value).max() <= 1 + NEARLY:
         length = math.sqrt(value @ value)
         if abs(length - 1) > NEARLY:
             raise ValueRangeError(
                 "rotation of a setpoint", got=f"a quaternion of length {length:.4g}", needs="length 1"
             )
         return np.asarray(Rotation.from_quat(value).as_matrix())
+    if value.shape == (4,):
+        raise ValueRangeError("rotation of a setpoint", got=value.tolist(), needs="a quaternion of length 1")
     if value.shape != (3, 3):
         raise SizeError("rotation of a setpoint", got=value.shape, needs="(3, 3), or a quaternion x, y, z, w")
+    small = np.abs(value).max() <= 1 + NEARLY  # what is not would overflow
     (a, b, c), (d, e, f), (g, h, i) = value.tolist()
-    right_handed = a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g) > 0
-    off = value.T @ value - EYE
+    right_handed = small and a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g) > 0
+    off = value.T @ value - EYE if small else EYE
     if np.abs(off).max() > NEARLY or not right_handed:
         raise ValueRangeError("rotation of a setpoint", got=value.tolist(), needs="orthonormal, right-handed")
     once = value - value @ off / 2  # toward the polar factor, each time with the square of what is missing
@@ -105,6 +110,8 @@ def _gain(name: str, value: Array | None) -> Array | None:
     """Return a gain as a matrix."""
     if value is None:
         return None
+    if value.size and np.abs(value).max() > STIFFEST:
+        raise ValueRangeError(f"{name} of a setpoint", got=value.tolist(), needs=f"at most {STIFFEST:g}")
     if value.ndim == 1 and len(value) in SIZES and (value >= 0).all():
         return np.diag(value)
     matrix = np.diag(value) if value.ndim == 1 else value
