@@ -13,7 +13,7 @@ import pytest
 
 import passiflex as pf
 from cli.shell import Shell
-from onboard.test_controller import planar
+from onboard.test_controller import CONTROL, planar
 from passiflex.errors import SimulationError
 from passiflex.onboard import ApproachSettings, Sensed, Twin, WatchSettings, run_on
 
@@ -27,6 +27,14 @@ WORLDS: dict[str, dict[str, Any]] = {
         "sensors": {"link_resolution": 1e-5, "velocity": "differences", "torque_offset": 0.05},
     },
     "it says less": {"sensors": {"says": ["q", "tau_a"], "velocity_filter": 60}},
+    "late sensors": {"sensors": {"link_delay": 0.002, "torque_delay": 0.001}},
+    "two rates": {"control": CONTROL | {"task_rate": 250}},
+    "an observer": {"control": CONTROL | {"external_torque": "observer"}},
+    "a way and gains": {
+        "reference": [{"at": 0.05, "kind": "move", "by": [0.02, 0, 0.02], "duration": 0.2}],
+        "gain_changes": [{"at": 0.2, "duration": 0.1, "stiffness": {"translation": 300}}],
+        "actions": {"follow_velocity": 1},
+    },
     "motors": {"motors": {"coulomb_friction": 0.2, "torque_limit": "robot", "torque_rate_limit": 5000}},
 }
 GENTLE = WatchSettings(frozen_after=np.inf, soft_start=0.1, soften=0.2)
