@@ -193,6 +193,8 @@ def test_what_a_robot_does_not_say_is_judged() -> None:
     controller = Controller(planar(), WatchSettings(frozen_after=np.inf))
     with pytest.raises(UnstableLoopError, match=r"remedy: D_x times 0\.2"):
         controller.start(arm.said("q"))
+    with pytest.raises(SimulationError, match="was not started"):
+        controller.step(arm.said("q"))
     for damping, grows in ((100, True), (15, False)):
         law = LAW | {"damping": {"translation": damping}}
         sure = {"allow_unstable": True, "fallback": {"damping": {"translation": 15}}}

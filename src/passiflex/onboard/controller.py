@@ -47,6 +47,13 @@ class Controller:
     weight_in_readings: Whether torque and motor positions contain the weight although the law does not carry it; left
         out, they do if the robot carries it (`gravity: robot`), as on real arms.
 
+    Attributes
+    ----------
+    torque: What the last step returned (n,) N m.
+    asked: What is asked for, by the names of a setpoint, to be read; `ask` writes it.
+    inputs: The numbers that the law was told last, flat: `said` by the robot, and its own `numbers`.
+    recorder: What keeps the periods, if anything does.
+
     Raises
     ------
     UnstableLoopError
@@ -78,6 +85,7 @@ class Controller:
         self._after, torque, self._signals = self._step.outputs
         self.torque: Array = torque.view()
         self.torque.flags.writeable = False
+        self._started = False
         self._heard: list[tuple[int, Array]] = []
         self._elapsed = self._said[self.law.said.slices["elapsed"]]
         self.asked = self.law.setpoint.unpack(self._setpoint)
@@ -112,6 +120,7 @@ class Controller:
         SizeError, ValueRangeError
             For readings that are too few, of another size, or not finite.
         """
+        self._started, self.recorder = False, None
         says = self._hear(sensed)
         full = self.problem.tank.initial if level is None else level
         q = self._begun(sensed, says, full)
@@ -120,6 +129,7 @@ class Controller:
         if wanted is not self._laid_out:
             self.problem, self._laid_out, self._judgement = laid_out(wanted), wanted, None
             self._begun(sensed, says, self.problem.tank.initial if level is None else level)
+        self._started = True
 
     def reset_at(self, sensed: Sensed, level: float | None = None) -> None:
         """Begin anew where the robot stands, as after a reflex, with the tank as it is unless a level is given [J]."""
@@ -133,7 +143,7 @@ class Controller:
         setpoint: None if there is no new one.
         elapsed: Time since the last step [s]; the period if it is left out.
         """
-        if not self._heard:
+        if not self._started:
             raise SimulationError("the controller was not started", try_="controller.start(sensed) before")
         try:
             for i, into in self._heard:
@@ -199,7 +209,7 @@ class Controller:
         return found._replace(why="; ".join(words))
 
     def record(self, seconds: float) -> Recorder:
-        """Return a recorder of the steps to come, with room for so many seconds."""
+        """Return a recorder of the steps to come, with room for so many seconds, until it is started anew."""
         self.recorder = Recorder(self.law, self.problem, round(seconds / self.period) + 1)
         return self.recorder
 
