@@ -126,7 +126,15 @@ def test_ctrl_c_lets_the_arm_go_softly(
 ) -> None:
     scenario = tmp_path / "arm.yaml"
     scenario.write_text(planar(duration=60).to_yaml())
-    threading.Timer(6.0, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
+    moves, write = threading.Event(), Twin.write
+
+    def moved(twin: Twin, torque: np.ndarray) -> None:
+        if not moves.is_set():  # from here on it is heard
+            moves.set()
+            threading.Timer(0.3, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
+        write(twin, torque)
+
+    monkeypatch.setattr(Twin, "write", moved)
     made = Shell(monkeypatch, capsys)("run", scenario, "--out", tmp_path / "run.nc")
     assert made.status == 3
     assert "stopped after" in made.out
