@@ -27,7 +27,6 @@ WORLDS: dict[str, dict[str, Any]] = {
         "sensors": {"link_resolution": 1e-5, "velocity": "differences", "torque_offset": 0.05},
     },
     "it says less": {"sensors": {"says": ["q", "tau_a"], "velocity_filter": 60}},
-    "late sensors": {"sensors": {"link_delay": 0.002, "torque_delay": 0.001}},
     "two rates": {"control": CONTROL | {"task_rate": 250}},
     "an observer": {"control": CONTROL | {"external_torque": "observer"}},
     "a way and gains": {
