@@ -83,13 +83,19 @@ def test_an_arm_that_says_less_goes_where_it_is_told(says: tuple[str, ...]) -> N
     assert controller.report.why == ""
 
 
-def test_a_weight_that_nobody_takes_out_pulls_the_arm_down() -> None:
+@pytest.mark.parametrize("taken_out", [True, False])
+def test_the_weight_in_the_readings_is_taken_out_unless_that_was_done(taken_out: bool) -> None:
+    """Of torque and motor position alike, by the weight that the arm's own equations have."""
     arm = ElasticArm("planar2r", START)
-    controller = Controller(planar(), WatchSettings(frozen_after=np.inf), weight_in_readings=False)
-    controller.start(arm.said("q", "tau_a"))
-    before = arm.hand
-    moved(arm, controller, ("q", "tau_a"), 1.0)
-    assert np.abs(arm.hand - before).max() < 0.02  # a spring that begins elsewhere, not a fall
+    controller = Controller(planar(), WatchSettings(frozen_after=np.inf), weight_in_readings=taken_out)
+    controller.start(arm.said("q", "theta", "tau_a"))
+    controller.step(arm.said("q", "theta", "tau_a"))
+    told = controller.law.signals.unpack(controller._signals)
+    weight, K = arm.weight(arm.x[:2]), arm.robot.joint_stiffness
+    assert np.abs(weight).max() > 10
+    np.testing.assert_allclose(told["measured_tau_a"], 0 if taken_out else weight, atol=1e-9)
+    given = told["measured_theta"] - told["measured_q"]
+    np.testing.assert_allclose(given, 0 if taken_out else weight / K, atol=1e-12)
 
 
 def test_a_law_that_carries_the_weight_itself() -> None:

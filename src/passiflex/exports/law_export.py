@@ -16,7 +16,6 @@ from passiflex.exports.law_rows import test_rows
 from passiflex.exports.law_text import functions_text, listed, parts_text, struct_text, values_text
 from passiflex.files import OutputError, as_path
 from passiflex.onboard import Controller, Sensed, WatchSettings
-from passiflex.sampled.said import SAYABLE
 from passiflex.scenarios.scenario import Scenario
 from passiflex.scenarios.sensor_settings import SensorSettings
 from passiflex.version import __version__
@@ -95,7 +94,7 @@ def _standing(controller: Controller, says: Sequence[str]) -> Sensed:
 
 def _header(controller: Controller) -> str:
     law, problem = controller.law, controller.problem
-    says = [name for name in (*SAYABLE, "F_e", "applied") if _says(controller, name)]
+    says = [name for name in Sensed._fields if _says(controller, name)]
     sizes = {
         "JOINTS": law.robot.n,
         "SAID": law.said.size,

@@ -20,6 +20,7 @@ from passiflex.parts import Parts
 from passiflex.robots.arm import EndEffectorPose
 from passiflex.sampled.controller import SampledController
 from passiflex.sampled.motors import limit_layout, limited
+from passiflex.sampled.readings import EXACT
 from passiflex.sampled.rest import Rest
 from passiflex.sampled.sensors import AbstractSensorEffect, Noise, Sensors
 from passiflex.sampled.signals import ControlParameters, PeriodResult, Setpoint
@@ -43,15 +44,18 @@ class PeriodLaw:
     Attributes
     ----------
     effects: On the readings, beside those of the sensors' own.
+    senses: Whether its sensors make readings late and noisy; those of a robot have done so already.
     """
 
     controller: SampledController
     effects: tuple[AbstractSensorEffect, ...] = ()
+    senses: bool = True
 
     @cached_property
     def sensors(self) -> Sensors:
         """Return the sensors."""
-        return Sensors(self.controller.law.robot.n, self.effects, self.controller.readings)
+        readings = self.controller.readings if self.senses else EXACT
+        return Sensors(self.controller.law.robot.n, self.effects, readings)
 
     @cached_property
     def parameters(self) -> Parts:

@@ -18,7 +18,8 @@ from passiflex.onboard.robot_numbers import robot_numbers
 from passiflex.onboard.sensed import Sensed
 from passiflex.onboard.setpoint import Setpoint
 from passiflex.onboard.settings import ApproachSettings, WatchSettings
-from passiflex.sampled.said import SAYABLE, SaysLess
+from passiflex.sampled.said import SaysLess
+from passiflex.sampled.sayable import SAYABLE
 from passiflex.scenarios.scenario import Scenario
 from passiflex.scenarios.scenario_file import load_scenario
 from passiflex.stability.judgement import Judgement, judge
@@ -210,7 +211,8 @@ class Controller:
 
     def record(self, seconds: float) -> Recorder:
         """Return a recorder of the steps to come, with room for so many seconds, until it is started anew."""
-        self.recorder = Recorder(self.law, self.problem, round(seconds / self.period) + 1)
+        felt = any(SAID[i] == "F_e" for i, _ in self._heard)
+        self.recorder = Recorder(self.law, self.problem, round(seconds / self.period) + 1, felt=felt)
         return self.recorder
 
     def _value(self, name: str) -> float:
@@ -218,13 +220,13 @@ class Controller:
 
     def _hear(self, sensed: Sensed) -> dict[str, float]:
         """Note what the robot says; return its numbers by name."""
-        says = {name: value is not None for name, value in zip(Sensed._fields, sensed, strict=True)}
+        says = {name: value is not None for name, value in zip(SAID, sensed, strict=True)}
         if not (says["q"] or says["theta"]):
             raise ValueRangeError(
                 "a robot that says neither where its links nor where its motors are", needs="q or theta"
             )
         slices = self.law.said.slices
-        self._heard = [(i, self._said[slices[name]]) for i, name in enumerate(Sensed._fields) if says[name]]
+        self._heard = [(i, self._said[slices[name]]) for i, name in enumerate(SAID) if says[name]]
         return {f"says_{name}": float(said) for name, said in says.items()}
 
     def _begun(self, sensed: Sensed, says: dict[str, float], level: float) -> Array:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from concurrent.futures import Future, ProcessPoolExecutor
+from dataclasses import fields
 from multiprocessing import get_context
 from typing import Any, NamedTuple
 
@@ -17,9 +18,9 @@ from passiflex.onboard.setpoint import Setpoint
 
 Array = NDArray[np.float64]
 
-ENTRIES = ("position", "rotation", "velocity", "acceleration", "stiffness", "damping", "wrench", "posture")
+ENTRIES = tuple(field.name for field in fields(Setpoint))
 """What a message may have."""
-GAINS = ("stiffness", "damping")
+GAINS = Gains._fields
 PATIENCE = 60.0
 """How long `wait` waits [s]."""
 

@@ -9,10 +9,12 @@ import casadi as cs
 
 from passiflex.control.signals import Measurement
 from passiflex.layout import Field, Layout
+from passiflex.onboard.sensed import Sensed
 from passiflex.robots.flexible import FlexibleJointRobot
-from passiflex.sampled.said import SAYABLE, Given, filled
+from passiflex.sampled.said import Given, filled
+from passiflex.sampled.sayable import SAYABLE
 
-SAID = (*SAYABLE, "F_e", "applied")
+SAID = Sensed._fields
 """What a robot may say."""
 
 

@@ -18,7 +18,7 @@ from passiflex.runs.run import Recorded, Run, assemble
 
 Array = NDArray[np.float64]
 
-BEFORE = "a robot"
+MOVED_BY = "a robot"
 """What moved the arm, in a run."""
 ASKED = {
     "desired_position": "position",
@@ -33,10 +33,16 @@ ASKED = {
 
 
 class Recorder:
-    """Room for so many periods, taken one after the other without another allocation; what comes then is left out."""
+    """Room for so many periods, taken one after the other without another allocation; what comes then is left out.
 
-    def __init__(self, law: RobotLaw, problem: SampledProblem, periods: int):
-        self.law, self.problem = law, problem
+    Attributes
+    ----------
+    felt: Whether the robot measures the wrench on its end effector.
+    count, left_out: Periods that were kept, and that found no room.
+    """
+
+    def __init__(self, law: RobotLaw, problem: SampledProblem, periods: int, *, felt: bool):
+        self.law, self.problem, self.felt = law, problem, felt
         sizes = (law.said.size, law.setpoint.size, law.memory.size, law.robot.n, law.signals.size)
         self.count, self.left_out = 0, 0
         self._parts = tuple(np.empty((periods, size)) for size in sizes)
@@ -70,7 +76,7 @@ class Recorder:
         time: Array = np.cumsum(heard["elapsed"][:, None].ravel()) - heard["elapsed"].ravel()[0]
         x = self._where(loop, told)
         rows = self._rows(loop, heard, setpoint)
-        controller = memory[:, : loop.memory.size]
+        controller = self._remembered(loop, memory)
         own = {f.name for f in loop.signals}
         z = np.hstack([signals[:, self.law.signals.slices[f.name]] for f in loop.signals if f.name in own])
         felt = rows[:, : loop.plant.environment.size]
@@ -81,7 +87,7 @@ class Recorder:
             for layout, part in zip(parts.values(), numbers, strict=True)
         ]
         whole = dataclasses.replace(problem, duration=float(time[-1]), output_interval=problem.period)
-        return assemble(whole, time, recorded, [], "", loop.witness.noted(watched), BEFORE)
+        return assemble(whole, time, recorded, [], "", loop.witness.noted(watched), MOVED_BY)
 
     def _where(self, loop: SampledLoop, told: dict[str, Array]) -> Array:
         """Return the state that the readings show, row by row."""
@@ -90,18 +96,22 @@ class Recorder:
             x[:, loop.plant.state.slices[name]] = told[f"measured_{name}"]
         return x
 
+    def _remembered(self, loop: SampledLoop, memory: Array) -> Array:
+        """Return the memory as a simulation has it; what simulated sensors keep back is 0."""
+        found = np.zeros((self.count, loop.memory.size))
+        for f in loop.memory:
+            if f.name in self.law.memory.slices:
+                found[:, loop.memory.slices[f.name]] = memory[:, self.law.memory.slices[f.name]]
+        return found
+
     def _rows(self, loop: SampledLoop, heard: dict[str, Array], setpoint: Array) -> Array:
         asked, at = self.law.setpoint.slices, loop.row.slices
         rows = np.zeros((self.count, loop.row.size))
         for name, of in ASKED.items():
             rows[:, at[name]] = setpoint[:, asked[of]]
         rows[:, at["elapsed"]] = heard["elapsed"].reshape(-1, 1)
-        says = self._says("F_e")
-        rows[:, at["F_e"]] = heard["F_e"] if says else 0.0
+        rows[:, at["F_e"]] = heard["F_e"] if self.felt else 0.0
         return rows
-
-    def _says(self, name: str) -> bool:
-        return bool(np.abs(self.law.said.unpack(self._parts[0][: self.count])[name]).any())
 
     def _judged(
         self,
@@ -126,7 +136,7 @@ class Recorder:
         at, true = loop.plant.energies.slices, loop.truth.unpack(truth)
         passed = np.einsum("ij,ij->i", (tau_a[1:] + tau_a[:-1]) / 2, np.diff(q, axis=0))
         quads[1:, at["joint"]] = np.cumsum(passed)[:, None]
-        if not self._says("F_e"):
+        if not self.felt:
             stored = true["link_kinetic_energy"] + true["potential_energy"]
             quads[:, at["external"]] = (stored - stored[0] - quads[:, at["joint"]].ravel())[:, None]
         witness = loop.witness

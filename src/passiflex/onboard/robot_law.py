@@ -42,7 +42,7 @@ class RobotLaw:
     @cached_property
     def period(self) -> PeriodLaw:
         """Return the period of a simulation."""
-        return PeriodLaw(self.controller, self.effects)
+        return PeriodLaw(self.controller, self.effects, senses=False)
 
     @property
     def robot(self) -> FlexibleJointRobot:

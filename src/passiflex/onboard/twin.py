@@ -15,7 +15,8 @@ from passiflex.native.fixed_step import step_function
 from passiflex.onboard.sensed import Sensed
 from passiflex.problems.problem import SampledProblem, require_sampled
 from passiflex.problems.resolution import resolve
-from passiflex.sampled.said import SAYABLE, SaysLess
+from passiflex.sampled.said import SaysLess
+from passiflex.sampled.sayable import SAYABLE
 from passiflex.sampled.sensors import Noise, Sensors
 from passiflex.scenarios.scenario import Scenario
 from passiflex.scenarios.sensor_settings import SensorSettings

@@ -22,7 +22,8 @@ from passiflex.sampled.controller import SampledController
 from passiflex.sampled.measurement_bound import BEND
 from passiflex.sampled.motors import UNLIMITED_TORQUE
 from passiflex.sampled.readings import Lateness, Readings
-from passiflex.sampled.said import SAYABLE, SaysLess
+from passiflex.sampled.said import SaysLess
+from passiflex.sampled.sayable import SAYABLE
 from passiflex.sampled.sensors import UNFILTERED, AbstractSensorEffect
 from passiflex.scenarios.action_settings import Actions
 from passiflex.scenarios.control_settings import Control

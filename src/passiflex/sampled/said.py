@@ -18,10 +18,8 @@ from numpy.typing import NDArray
 from passiflex.control.signals import Measurement
 from passiflex.layout import Field, Layout
 from passiflex.sampled.rest import Remembered, Rest
+from passiflex.sampled.sayable import POSITIONS, SAYABLE
 from passiflex.sampled.sensors import AbstractSensorEffect, Reading, difference, low_pass
-
-SAYABLE = ("q", "theta", "dq", "dtheta", "tau_a")
-"""What a robot may say of its joints."""
 
 
 class Filled(NamedTuple):
@@ -120,7 +118,7 @@ class SaysLess(AbstractSensorEffect):
     @property
     def guesses(self) -> bool:
         """Return whether the joints' torque is guessed."""
-        return "tau_a" not in self.names and not {"q", "theta"} <= set(self.names)
+        return "tau_a" not in self.names and not set(self.names) >= POSITIONS
 
     def state(self, n: int) -> Layout:
         """Return what it remembers."""

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field, field_validator
 
+from passiflex.sampled.sayable import POSITIONS, SAYABLE
 from passiflex.scenarios.control_settings import ENDLESS, Frequency, PerJoint, Vector
 from passiflex.scenarios.spans import Instant
 from passiflex.texts.quantity import Quantity
@@ -13,6 +14,10 @@ from passiflex.texts.section import Mistakes, Section
 
 if TYPE_CHECKING:  # who reads a scenario needs no CasADi
     from passiflex.sampled.readings import Lateness
+
+    Sayable = str
+else:
+    Sayable = Literal[SAYABLE]
 
 Angle = Annotated[float, Quantity("rad", least=0)]
 MOST_LATE = 20
@@ -40,8 +45,8 @@ class SensorSettings(Section):
     )
     link_resolution: Angle = Field(default=0.0, description="resolution of q, rad; 0 for none")
     motor_resolution: Angle = Field(default=0.0, description="resolution of θ, rad; 0 for none")
-    says: tuple[Literal["q", "theta", "dq", "dtheta", "tau_a"], ...] = Field(
-        default=("q", "theta", "dq", "dtheta", "tau_a"),
+    says: tuple[Sayable, ...] = Field(
+        default=SAYABLE,
         description="what the robot says of its joints, q or theta at least; the law is told what follows from it",
     )
     velocity: Literal["true", "differences"] = Field(
@@ -67,9 +72,9 @@ class SensorSettings(Section):
     @field_validator("says")
     @classmethod
     def _where_it_is(cls, says: tuple[str, ...]) -> tuple[str, ...]:
-        if not {"q", "theta"} & set(says):
+        if not POSITIONS & set(says):
             raise ValueError("needs q, theta, or both: a law must know where the joints are")
-        return tuple(name for name in ("q", "theta", "dq", "dtheta", "tau_a") if name in says)
+        return tuple(name for name in SAYABLE if name in says)
 
     @property
     def lateness(self) -> Lateness:
