@@ -131,7 +131,10 @@ def test_the_command(
     shell = Shell(monkeypatch, capsys)
     made = shell("run", scenario, "--out", tmp_path / "run.nc", "--fast")
     assert (made.status, made.out) == (0, f"wrote {tmp_path / 'run.nc'}\n")
-    assert shell("audit", tmp_path / "run.nc").status == 0
+    audited = shell("audit", tmp_path / "run.nc")
+    assert audited.status == 0
+    assert "judged by what the robot says of itself" in audited.out
+    assert "that it does not declare" not in audited.out
     assert "needs one of twin" in shell("run", scenario, "--out", tmp_path / "x.nc", "--robot", "franka").err
 
 

@@ -119,14 +119,16 @@ def audit(run: Path, /) -> int:
     decided = "least margin" if result.verdict == "passive" else "decided"
     console.print(f"{decided} at {result.time:g} s, most of it taken by: {result.term}")
     console.print(f"margin: {result.margin:.6g} J, integration error {result.integration_error:.1e} J")
-    if read.moved_elsewhere:
+    if read.as_read:
+        console.print(
+            "judged by what the robot says of itself, as good as its torque sensors and encoders are"
+        )
+    elif read.moved_elsewhere:
         console.print(f"moved by {read.engine}")
     if not result.every_step:
         console.print("judged by the rows of the file alone: what happened between them was not noted")
     if result.ledger_residual > max(10 * result.integration_error, WORTH_A_WORD):
-        console.print(
-            f"what touches the robot gives or takes {result.ledger_residual:.2e} J that it does not declare"
-        )
+        console.print(_unclosed(read, result))
     if result.books_error > max(10 * result.integration_error, WORTH_A_WORD):
         console.print(_wrong_books(read, result))
     if read.sampled:
@@ -174,6 +176,14 @@ def keys(
             table.add_row(*row)
         console.print(table)
     return 0
+
+
+def _unclosed(run: Run, result: Audit) -> str:
+    """Return by how much the robot's balance does not close, and what that is of."""
+    missed = f"{result.ledger_residual:.2e} J"
+    if run.as_read:
+        return f"by its readings the robot's balance misses {missed}: their resolution, delay, friction, model error"
+    return f"what touches the robot gives or takes {missed} that it does not declare"
 
 
 def _wrong_books(run: Run, result: Audit) -> str:

@@ -25,10 +25,10 @@ def ideal_motion(run: Run) -> Array | None:
 
     None if the scenario cannot be read or its robot not be found, and where something acts that the
     ideal does not know: gains that change in flight or are in tool axes, what touches the robot, feed-forward wrenches,
-    free directions, parts of one's own.
+    free directions, parts of one's own. None of a robot's own run, whose reference and forces came from outside.
     """
     scenario = run.scenario
-    if run.own_parts:
+    if run.own_parts or run.as_read:
         return None
     if scenario is None or scenario.gains_change or scenario.environment or scenario.feedforward:
         return None

@@ -14,12 +14,10 @@ from passiflex.loops.sampled_loop import SampledLoop
 from passiflex.native import NativeFunction, compile_functions
 from passiflex.onboard.robot_law import RobotLaw
 from passiflex.problems.problem import SampledProblem
-from passiflex.runs.run import Recorded, Run, assemble
+from passiflex.runs.run import AS_READ, Recorded, Run, assemble
 
 Array = NDArray[np.float64]
 
-MOVED_BY = "a robot"
-"""What moved the arm, in a run."""
 ASKED = {
     "desired_position": "position",
     "desired_rotation": "rotation",
@@ -87,7 +85,7 @@ class Recorder:
             for layout, part in zip(parts.values(), numbers, strict=True)
         ]
         whole = dataclasses.replace(problem, duration=float(time[-1]), output_interval=problem.period)
-        return assemble(whole, time, recorded, [], "", loop.witness.noted(watched), MOVED_BY)
+        return assemble(whole, time, recorded, [], "", loop.witness.noted(watched), AS_READ)
 
     def _where(self, loop: SampledLoop, told: dict[str, Array]) -> Array:
         """Return the state that the readings show, row by row."""

@@ -34,6 +34,8 @@ if TYPE_CHECKING:
 
 JOINT_PARAMETERS = ("joint_stiffness", "joint_damping", "motor_inertia")
 """Of the robot as described: with the arm's description they make it again, without its file."""
+AS_READ = "a robot"
+"""Engine of a run that a robot's own readings make."""
 COORDINATES = {
     "axis": ["x", "y", "z"],
     "column": ["x", "y", "z"],
@@ -78,6 +80,11 @@ class Run:
     def moved_elsewhere(self) -> bool:
         """Return whether another simulator moved the plant."""
         return bool(self.engine) and not self.engine.startswith("passiflex")
+
+    @property
+    def as_read(self) -> bool:
+        """Return whether it is what a robot said of itself, and nobody else saw where that was."""
+        return self.engine == AS_READ
 
     @property
     def sampled(self) -> bool:
