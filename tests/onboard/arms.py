@@ -41,13 +41,16 @@ class ElasticArm:
 
     Parameters
     ----------
+    steps: Of Runge-Kutta in a period.
     carries: Whether its firmware holds its weight, as of a torque-controlled arm's; with gravity in either case.
     """
 
-    def __init__(self, name: str, q: list[float], period: float = 1e-3, *, carries: bool = True):
+    def __init__(
+        self, name: str, q: list[float], period: float = 1e-3, *, carries: bool = True, steps: int = STEPS
+    ):
         self.robot, self.plant, self._step, self._weight = _functions(name)
         self.numbers = self.robot.layout.pack(self.robot.nominal())
-        self.period, self.carries = period, carries
+        self.period, self.carries, self._steps = period, carries, steps
         self._n = self.robot.n
         self.push = np.zeros(6)
         start, K = np.array(q, dtype=float), self.robot.joint_stiffness
@@ -79,10 +82,12 @@ class ElasticArm:
     def move(self, torque: Array) -> None:
         """Go on by a period."""
         self.told = np.array(torque)
-        for _ in range(STEPS):
+        for _ in range(self._steps):
             held = self.told + (self.weight(self.x[: self._n]) if self.carries else 0.0)
             self._y = np.asarray(
-                self._step(self._y, np.concatenate([held, self.push]), self.numbers, self.period / STEPS)
+                self._step(
+                    self._y, np.concatenate([held, self.push]), self.numbers, self.period / self._steps
+                )
             )
 
     def said(self, *names: str) -> Sensed:

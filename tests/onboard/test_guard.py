@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation, Slerp
 
+import passiflex as pf
 from onboard.arms import ElasticArm
 from onboard.test_controller import ALL, START, planar
-from passiflex.onboard import ApproachSettings, Controller, Guard, Setpoint, WatchSettings
+from passiflex.onboard import ApproachSettings, Controller, Guard, Sensed, Setpoint, WatchSettings
 from passiflex.problems.altered import altered
 from passiflex.stability.judgement import judge
 
@@ -46,6 +47,31 @@ def test_gains_that_pass_hold(guard: Guard) -> None:
         assert judge(altered(problem, gains=now)).stable
         passed += bool(message) and guard.counts.reduced == before
     assert 2 < passed < 23
+
+
+@pytest.mark.slow
+def test_gains_that_pass_hold_on_an_iiwa() -> None:
+    """Of low rank in six directions most do not hold, for damping that is missing in one of them."""
+    scenario = pf.shipped_scenario("fig1_sampled").changed({"control.external_torque": "none"})
+    controller = Controller(scenario, WATCH)
+    problem, rng = controller.problem, np.random.default_rng(3)
+    controller.start(Sensed(q=problem.q, dq=np.zeros(7), tau_a=np.zeros(7)))
+    problem = controller.problem
+    now = {name: problem.law.layout.unpack(problem.gains)[name] for name in ("stiffness", "damping")}
+    with Guard(controller) as guard:
+        for _ in range(60):
+            roots = {name: rng.normal(size=(6, rng.integers(1, 7))) for name in now}
+            most = {"stiffness": 5, "damping": 3}
+            message = {
+                n: r @ r.T * 10 ** rng.uniform(-1, most[n]) for n, r in roots.items() if rng.random() < 0.8
+            }
+            guard.send(**message)
+            guard.wait()
+            taken = guard.take()
+            assert taken is not None
+            now |= {name: v for name in now if (v := getattr(taken, name)) is not None}
+            assert judge(altered(problem, gains=now)).stable
+        assert guard.counts.reduced > 20
 
 
 def test_gains_that_do_not_hold_are_taken_in_part_and_said(guard: Guard) -> None:
